@@ -1,7 +1,7 @@
 //! The Jensen-Shannon divergence between smoothed histograms.
 //!
-//! Each point is a normal density of standard deviation `width`, whose probabilities of the bins are added; the first and
-//! the last bin are open. The probabilities are smooth functions of the values.
+//! Each point is a normal density of standard deviation `width`, whose probabilities of the bins are added; the first
+//! and the last bin are open. The probabilities are smooth functions of the values.
 
 use std::f64::consts::TAU;
 

@@ -16,8 +16,8 @@ pub(super) struct Set {
     /// Output of each point.
     pub outputs: Vec<usize>,
     pub to_data: ToData,
-    /// Output of each point of each simulated data set, `simulations x points`: another order than that of the data if the
-    /// response is a sample.
+    /// Output of each point of each simulated data set, `simulations x points`: another order than that of the data if
+    /// the response is a sample.
     pub drawn: Vec<Vec<usize>>,
     /// Standard normal noise, `simulations x points`.
     pub noise: Matrix,
@@ -112,8 +112,8 @@ impl Approximate {
         })
     }
 
-    /// Variance of each output of a new replicate about the response, without common errors: the noise, and for a sample the
-    /// scatter of its values.
+    /// Variance of each output of a new replicate about the response, without common errors: the noise, and for a
+    /// sample the scatter of its values.
     fn variance(&self, response: &[f64], hyper: &[f64]) -> Vec<f64> {
         let Some(groups) = self.noise.variance.values(hyper) else {
             return vec![f64::NAN; response.len()];

@@ -17,14 +17,14 @@ pub enum Metric {
     /// distance between projections (Nadjahi et al., ICASSP 2020, p. 5470).
     #[default]
     Wasserstein,
-    /// Maximum mean discrepancy with a Gaussian kernel, a number (Gretton et al., J. Machine Learning Research 13 (2012)
-    /// 723): the root of its V-statistic.
+    /// Maximum mean discrepancy with a Gaussian kernel, a number (Gretton et al., J. Machine Learning Research 13
+    /// (2012) 723): the root of its V-statistic.
     MaximumMeanDiscrepancy,
-    /// Energy distance, the root of `2 E|X - Y| - E|X - X'| - E|Y - Y'|`, in the root of the unit of the response (Székely
-    /// and Rizzo, J. Statistical Planning and Inference 143 (2013) 1249).
+    /// Energy distance, the root of `2 E|X - Y| - E|X - X'| - E|Y - Y'|`, in the root of the unit of the response
+    /// (Székely and Rizzo, J. Statistical Planning and Inference 143 (2013) 1249).
     Energy,
-    /// Jensen-Shannon distance, a number from 0 to 0.833: the root of the divergence in natural units (Endres and Schindelin,
-    /// IEEE Trans. Information Theory 49 (2003) 1858) between histograms smoothed by a normal density.
+    /// Jensen-Shannon distance, a number from 0 to 0.833: the root of the divergence in natural units (Endres and
+    /// Schindelin, IEEE Trans. Information Theory 49 (2003) 1858) between histograms smoothed by a normal density.
     JensenShannon,
 }
 
@@ -37,8 +37,8 @@ pub(super) enum ToData {
 }
 
 impl ToData {
-    /// The distance to points of these values; with a coordinate they are points of a plane, and those of any other sample
-    /// have the same coordinates.
+    /// The distance to points of these values; with a coordinate they are points of a plane, and those of any other
+    /// sample have the same coordinates.
     pub fn new(
         metric: Metric,
         coordinate: Option<Vec<f64>>,
@@ -61,8 +61,8 @@ impl ToData {
         })
     }
 
-    /// The squared distance to a sample of as many values as the data, and its derivative by each value if `slopes` has room
-    /// for them.
+    /// The squared distance to a sample of as many values as the data, and its derivative by each value if `slopes` has
+    /// room for them.
     pub fn square(&self, values: &[f64], slopes: Option<&mut [f64]>) -> f64 {
         match self {
             Self::Projections(projections) => projections.square(values, slopes),

@@ -27,9 +27,9 @@ use metric::ToData;
 ///
 /// The distance is one of distributions. All values of a set of points form a sample, measured and simulated, whatever
 /// their order. With `axis_weight` the points have two coordinates, place and value, so that a feature which comes a
-/// little too late is at a small distance from the measured one, and not at two full heights (curve matching; Bernton et
-/// al., J. R. Stat. Soc. B 81 (2019) 235). With `sample = true` the response is a sample of a random quantity: what a
-/// stochastic simulator returns, or quantiles. Choose this discrepancy if no likelihood can be written down: times
+/// little too late is at a small distance from the measured one, and not at two full heights (curve matching; Bernton
+/// et al., J. R. Stat. Soc. B 81 (2019) 235). With `sample = true` the response is a sample of a random quantity: what
+/// a stochastic simulator returns, or quantiles. Choose this discrepancy if no likelihood can be written down: times
 /// that scatter, outputs with two modes, realisations that have no partner among the data.
 ///
 /// The likelihood is the mean of the kernel over `simulations` data sets (Del Moral, Doucet and Jasra, Statistics and
@@ -39,48 +39,49 @@ use metric::ToData;
 /// mean over simulated sets of Π_g exp(-d_g² / (2 tolerance²)) / tolerance
 /// ```
 ///
-/// with one distance `d_g` for each set of points `g` (`distance_by`). A simulated data set is the response, one draw of
-/// the common errors, and noise of `variance`. The random numbers are the same at each evaluation, so that every sampler
-/// can be used; the result is that of this estimate of the likelihood, which more `simulations` improve. With
-/// `sequential_monte_carlo` the tolerance falls from infinity to its value in steps chosen by the effective sample size:
-/// a likelihood raised to the power `β` is one of the tolerance `tolerance / √β`. This is the adaptive method of the
-/// paper above, and with the Jensen-Shannon distance that of Yang et al., Mechanical Systems and Signal Processing 162
-/// (2022) 107954.
+/// with one distance `d_g` for each set of points `g` (`distance_by`). A simulated data set is the response, one draw
+/// of the common errors, and noise of `variance`. The random numbers are the same at each evaluation, so that every
+/// sampler can be used; the result is that of this estimate of the likelihood, which more `simulations` improve. With
+/// `sequential_monte_carlo` the tolerance falls from infinity to its value in steps chosen by the effective sample
+/// size: a likelihood raised to the power `β` is one of the tolerance `tolerance / √β`. This is the adaptive method of
+/// the paper above, and with the Jensen-Shannon distance that of Yang et al., Mechanical Systems and Signal Processing
+/// (2022).
 ///
 /// The posterior is that of data known to within `tolerance`. As the tolerance vanishes it becomes the posterior given
-/// the sample; as it grows, the prior. Lower it until the posterior does not change, and raise `simulations` meanwhile: at
-/// the MAP the kernel must exceed zero for many of them. Evidences with different metrics are not comparable. Leave-one-out
-/// predictions do not exist. The cost of `wasserstein` grows as `n log n` with the number of points, that of
-/// `jensen_shannon` as `n`, the others as `n²`.
+/// the sample; as it grows, the prior. Lower it until the posterior does not change, and raise `simulations` meanwhile:
+/// at the MAP the kernel must exceed zero for many of them. Evidences with different metrics are not comparable.
+/// Leave-one-out predictions do not exist. The cost of `wasserstein` grows as `n log n` with the number of points, that
+/// of `jensen_shannon` as `n`, the others as `n²`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Distance {
     /// Distance between the measured and a simulated sample.
     #[serde(default)]
     pub metric: Metric,
-    /// Tolerance of the distance, in its unit: `{ known = 0.1 }`, or a prior such as `{ half_normal = 0.1 }` if it is to be
-    /// found; unknown ones are named `tolerance`, or `tolerance[B]`.
+    /// Tolerance of the distance, in its unit: `{ known = 0.1 }`, or a prior such as `{ half_normal = 0.1 }` if it is
+    /// to be found; unknown ones are named `tolerance`, or `tolerance[B]`.
     pub tolerance: Quantity,
-    /// Sets of points with a distance of their own: `"all"`, one per value of an axis such as `"sensor"`, windows of an axis,
-    /// or a list of these. With the axis of the points themselves each place is compared alone, over the replicates.
+    /// Sets of points with a distance of their own: `"all"`, one per value of an axis such as `"sensor"`, windows of an
+    /// axis, or a list of these. With the axis of the points themselves each place is compared alone, over the
+    /// replicates.
     #[serde(default)]
     pub distance_by: By,
-    /// Distance in the unit of the response that a distance of 1 along the axis is worth: the height of a feature over its
-    /// width, for example. Default: the places along the axis do not count.
+    /// Distance in the unit of the response that a distance of 1 along the axis is worth: the height of a feature over
+    /// its width, for example. Default: the places along the axis do not count.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis_weight: Option<f64>,
     /// Name of the numeric axis of `axis_weight`. Default: the last numeric axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub along: Option<String>,
-    /// True if the values of a set are a sample of a random quantity: each simulated data set then takes as many values from
-    /// the response as were measured, at random with replacement.
+    /// True if the values of a set are a sample of a random quantity: each simulated data set then takes as many values
+    /// from the response as were measured, at random with replacement.
     #[serde(default)]
     pub sample: bool,
     /// Number of simulated data sets.
     #[serde(default = "simulations")]
     pub simulations: usize,
-    /// Width of the kernel of `maximum_mean_discrepancy`, or of the smoothing of `jensen_shannon`, in the unit of the response.
-    /// Default: the median distance between measured points, or Silverman's width for the measured values.
+    /// Width of the kernel of `maximum_mean_discrepancy`, or of the smoothing of `jensen_shannon`, in the unit of the
+    /// response. Default: the median distance between measured points, or Silverman's width for the measured values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bandwidth: Option<f64>,
     /// Variance of the noise, in the squared unit of the response: a prior such as `{ half_normal = 1e-6 }`,

@@ -4,8 +4,8 @@
 //! D² = mean k(x, x') + mean k(y, y') - 2 mean k(x, y)
 //! ```
 //!
-//! over all pairs (V-statistics), with `k` minus the distance of the points for the energy distance, and a Gaussian for the
-//! maximum mean discrepancy.
+//! over all pairs (V-statistics), with `k` minus the distance of the points for the energy distance, and a Gaussian for
+//! the maximum mean discrepancy.
 
 /// Similarity of two points.
 #[derive(Debug, Clone, Copy, PartialEq)]

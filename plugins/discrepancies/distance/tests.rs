@@ -1,5 +1,5 @@
-//! Distances against SciPy, NumPy and POT; the likelihood and the posterior of a normal mean against their closed forms; a sample
-//! of two modes.
+//! Distances against SciPy, NumPy and POT; the likelihood and the posterior of a normal mean against their closed
+//! forms; a sample of two modes.
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::{PI, TAU};
@@ -28,8 +28,9 @@ fn curve(values: &[f64]) -> Measurements {
 }
 
 /// Values by SciPy 1.17.1 (`wasserstein_distance`, `energy_distance`, `jensenshannon` of the bins' probabilities by
-/// `norm.cdf`), by NumPy with the kernel matrices written out, and by POT 0.9.7 (`sliced_wasserstein_distance` with the same
-/// directions), for `x = sin(1.3 i) + 0.1 i` and `y = 1.4 cos(0.9 i) + 0.3` at the places `0.25 i`, `i` from 0 to 11.
+/// `norm.cdf`), by NumPy with the kernel matrices written out, and by POT 0.9.7 (`sliced_wasserstein_distance` with the
+/// same directions), for `x = sin(1.3 i) + 0.1 i` and `y = 1.4 cos(0.9 i) + 0.3` at the places `0.25 i`, `i` from 0 to
+/// 11.
 #[test]
 fn the_distances_are_those_of_other_programs() {
     use Metric::{Energy, JensenShannon, MaximumMeanDiscrepancy, Wasserstein};
@@ -84,8 +85,8 @@ fn it_has_its_derivatives() {
     }
 }
 
-/// One number with normal noise: the mean of the kernel is twice the normal density of the difference, with the variances of
-/// noise, common error and kernel added. Its Monte Carlo error is that of a mean of Gaussian kernels.
+/// One number with normal noise: the mean of the kernel is twice the normal density of the difference, with the
+/// variances of noise, common error and kernel added. Its Monte Carlo error is that of a mean of Gaussian kernels.
 #[test]
 fn the_likelihood_of_a_normal_number_has_its_closed_form() {
     const SIMULATIONS: f64 = 20_000.0;
@@ -108,8 +109,8 @@ fn the_likelihood_of_a_normal_number_has_its_closed_form() {
     }
 }
 
-/// The posterior of a normal mean with a flat prior is normal about the datum, with the variances of noise and kernel added;
-/// as the tolerance vanishes, it is that of the noise.
+/// The posterior of a normal mean with a flat prior is normal about the datum, with the variances of noise and kernel
+/// added; as the tolerance vanishes, it is that of the noise.
 #[test]
 fn the_posterior_of_a_normal_mean_has_its_closed_form() {
     let simulations = 1000.0_f64;
@@ -136,8 +137,8 @@ fn the_posterior_of_a_normal_mean_has_its_closed_form() {
     }
 }
 
-/// Sixty outcomes at plus or minus one, which has no partner in the response: the distance finds the separation of the modes,
-/// the normal likelihood of the differences takes it for noise.
+/// Sixty outcomes at plus or minus one, which has no partner in the response: the distance finds the separation of the
+/// modes, the normal likelihood of the differences takes it for noise.
 #[test]
 fn it_finds_two_modes_that_a_normal_likelihood_averages() {
     let side = |seed: u64| {

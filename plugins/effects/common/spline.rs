@@ -85,7 +85,8 @@ pub fn shifted(
 }
 
 /// Calls `each` for every point of a curve with the spline's value and slope at another time: at the point's time less
-/// `by` of it, which leaves the order of the points as it is. Before its first point and after its last a curve is at rest.
+/// `by` of it, which leaves the order of the points as it is. Before its first point and after its last a curve is at
+/// rest.
 pub fn shifted_by(
     knots: &Knots<'_>,
     values: &[f64],
@@ -96,8 +97,8 @@ pub fn shifted_by(
     sampled(knots, values, slopes, |i| knots.at[i] - by(knots.at[i]), each);
 }
 
-/// Calls `each` for every point of a curve with the spline's value and slope at another time, that of the point's index,
-/// which does not decrease. Before its first point and after its last a curve is at rest.
+/// Calls `each` for every point of a curve with the spline's value and slope at another time, that of the point's
+/// index, which does not decrease. Before its first point and after its last a curve is at rest.
 pub fn sampled(
     knots: &Knots<'_>,
     values: &[f64],

@@ -140,8 +140,8 @@ mod tests {
 
     /// The warps of the simulated curves of Tucker, Wu and Srivastava (Computational Statistics and Data Analysis 61
     /// (2013) 50), after Kneip and Ramsay (2008): `(exp(a u) - 1) / (exp(a) - 1)`. Their logarithmic rate is a straight
-    /// line, whose expansion in cosines is `-4 a / π² Σ cos(k π u) / k²` over odd `k`. The rest after `k` = 7 integrates
-    /// to less than `4 a / π³ Σ 1/k³` = 5.0e-4, times the largest rate, 1.6.
+    /// line, whose expansion in cosines is `-4 a / π² Σ cos(k π u) / k²` over odd `k`. The rest after `k` = 7
+    /// integrates to less than `4 a / π³ Σ 1/k³` = 5.0e-4, times the largest rate, 1.6.
     #[test]
     fn it_contains_the_warps_of_the_literature() {
         let grid: Vec<f64> = (0..=50).map(|i| 0.02 * f64::from(i)).collect();

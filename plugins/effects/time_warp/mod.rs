@@ -32,25 +32,25 @@ use map::Map;
 ///
 /// `u` runs from 0 to 1 along the curve, and the constant keeps the last time where it is: the warp `w` is increasing
 /// whatever its unknowns are, and both ends of the curve stay. A shift is the effect `delay` and a uniform stretch is
-/// `clock_rate`; put them before or after the warp. The `s_k` are the direction of the vector `shape[k] / k`: divided by
-/// its length, so that `deviation` alone is the size of the warp (0.01 added to the squared length keeps the warp smooth
-/// where all shapes are zero). The length of the vector of shapes remains as uncertain as its prior.
+/// `clock_rate`; put them before or after the warp. The `s_k` are the direction of the vector `shape[k] / k`: divided
+/// by its length, so that `deviation` alone is the size of the warp (0.01 added to the squared length keeps the warp
+/// smooth where all shapes are zero). The length of the vector of shapes remains as uncertain as its prior.
 ///
-/// The logarithm of the rate is as in Ramsay and Silverman, Functional Data Analysis (2005), chapter 7; the weights `1/k`
-/// are those of the cosines of a Brownian motion about its mean over the curve (Karhunen–Loève expansion).
+/// The logarithm of the rate is as in Ramsay and Silverman, Functional Data Analysis (2005), chapter 7; the weights
+/// `1/k` are those of the cosines of a Brownian motion about its mean over the curve (Karhunen–Loève expansion).
 ///
 /// With a slope of the curve of zero nothing is known about the warp: a curve without features determines none of the
 /// shapes, whose posteriors are then their priors. One warp serves all curves on which the effect acts; write one
-/// effect for each group of curves with clocks of their own (`on`). Between its points a curve is interpolated by a cubic
-/// spline, as for `delay`.
+/// effect for each group of curves with clocks of their own (`on`). Between its points a curve is interpolated by a
+/// cubic spline, as for `delay`.
 ///
 /// It is easily confused with `delay`, `clock_rate`, and parameters that set the times of features. The search for
 /// missing effects does not propose it: a warp reproduces many a difference that has another cause.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TimeWarp {
-    /// Prior of the standard deviation of the logarithm of the rate along the curve, a number: with 0.2, time runs about
-    /// 20 % faster in one part and 20 % slower in another.
+    /// Prior of the standard deviation of the logarithm of the rate along the curve, a number: with 0.2, time runs
+    /// about 20 % faster in one part and 20 % slower in another.
     pub deviation: Distribution,
     /// Number of unknown shapes, 1 to 8. Each has the standard normal prior and is named `shape[1]`, `shape[2]`, …; the
     /// shape `k` has `k` half-waves along the curve.
