@@ -34,7 +34,8 @@ use map::Map;
 /// whatever its unknowns are, and both ends of the curve stay. A shift is the effect `delay` and a uniform stretch is
 /// `clock_rate`; put them before or after the warp. The `s_k` are the direction of the vector `shape[k] / k`: divided
 /// by its length, so that `deviation` alone is the size of the warp (0.01 added to the squared length keeps the warp
-/// smooth where all shapes are zero). The length of the vector of shapes remains as uncertain as its prior.
+/// smooth where all shapes are zero). The length of the vector of shapes remains as uncertain as its prior. Of the
+/// samplers `no_u_turn` suits it best.
 ///
 /// The logarithm of the rate is as in Ramsay and Silverman, Functional Data Analysis (2005), chapter 7; the weights
 /// `1/k` are those of the cosines of a Brownian motion about its mean over the curve (Karhunen–Loève expansion).
