@@ -1,9 +1,9 @@
 //! Discrepancies: statistical models of the difference between data and model.
 
+pub mod approximate_bayesian_computation;
 pub mod autoregressive;
 pub mod common;
 pub mod constrained_gaussian_process;
-pub mod distance;
 pub mod embedded;
 pub mod gaussian;
 pub mod gaussian_process;

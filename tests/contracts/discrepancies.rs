@@ -6,6 +6,15 @@ use crate::{Table, all};
 
 #[test]
 fn they_keep_their_contract() {
+    let approximate_bayesian_computation = &[
+        "tolerance = { known = 0.3 }\nvariance = { half_normal = 1.0 }\nsimulations = 5",
+        "metric = \"energy\"\naxis_weight = 3000.0\ntolerance = { half_normal = 1.0 }\nsimulations = 5\n\
+         variance = { measured = { known = 1 } }\ndistance_by = { axis = \"time\", windows = 2 }",
+        "metric = \"maximum_mean_discrepancy\"\nsample = true\ntolerance = { half_normal = 1.0 }\n\
+         variance = { half_normal = 1.0 }\nsimulations = 5",
+        "metric = \"jensen_shannon\"\ntolerance = { half_normal = 1.0 }\nbandwidth = 0.2\nsimulations = 5\n\
+         variance = { half_normal = 1.0 }\nby = \"sensor\"",
+    ];
     let autoregressive = &[
         "variance = { half_normal = 1.0 }\ncorrelation_time = { log_normal = [-9, 1] }",
         "variance = { half_normal = 1.0 }\nby = \"sensor\"\ncorrelation_time = { known = 1e-4 }",
@@ -20,15 +29,6 @@ fn they_keep_their_contract() {
          variance = { half_normal = 1.0 }\nby = \"sensor\"",
         "bias = { known = 0.1 }\ncorrelation_length = { known = 3e-4 }\nsign = \"negative\"\nplaces = 3\n\
          kernel = \"matern_3_2\"\nvariance = { measured = { known = 1 } }",
-    ];
-    let distance = &[
-        "tolerance = { known = 0.3 }\nvariance = { half_normal = 1.0 }\nsimulations = 5",
-        "metric = \"energy\"\naxis_weight = 3000.0\ntolerance = { half_normal = 1.0 }\nsimulations = 5\n\
-         variance = { measured = { known = 1 } }\ndistance_by = { axis = \"time\", windows = 2 }",
-        "metric = \"maximum_mean_discrepancy\"\nsample = true\ntolerance = { half_normal = 1.0 }\n\
-         variance = { half_normal = 1.0 }\nsimulations = 5",
-        "metric = \"jensen_shannon\"\ntolerance = { half_normal = 1.0 }\nbandwidth = 0.2\nsimulations = 5\n\
-         variance = { half_normal = 1.0 }\nby = \"sensor\"",
     ];
     let embedded = &[
         "spread = { first = { half_normal = 1.0 }, second = { known = 0.3 } }\n\
@@ -72,9 +72,9 @@ fn they_keep_their_contract() {
         "scale = { known = 0.2 }\ncommon = { share = 0.9, most = 1 }",
     ];
     let table: &Table = &[
+        ("approximate_bayesian_computation", approximate_bayesian_computation),
         ("autoregressive", autoregressive),
         ("constrained_gaussian_process", constrained_gaussian_process),
-        ("distance", distance),
         ("embedded", embedded),
         ("gaussian", gaussian),
         ("gaussian_process", gaussian_process),

@@ -14,7 +14,8 @@ use super::metric::{Metric, ToData};
 use crate::discrepancies::common::testing::{OUTPUTS, common, data, has_its_derivatives};
 
 fn build(text: &str, data: &Measurements, errors: &[CommonError]) -> Box<dyn Likelihood> {
-    let built = registry::from_text::<dyn Discrepancy>("distance", text).unwrap();
+    let built =
+        registry::from_text::<dyn Discrepancy>("approximate_bayesian_computation", text).unwrap();
     built.plugin.likelihood(&Known::without_slopes(data, errors)).unwrap()
 }
 

@@ -1,4 +1,4 @@
-//! `distance`: a likelihood that is a distance between measured and simulated samples.
+//! `approximate_bayesian_computation`: a likelihood that is a distance between measured and simulated samples.
 
 mod histogram;
 mod likelihood;
@@ -54,7 +54,7 @@ use metric::ToData;
 /// of `jensen_shannon` as `n`, the others as `n²`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Distance {
+pub struct ApproximateBayesianComputation {
     /// Distance between the measured and a simulated sample.
     #[serde(default)]
     pub metric: Metric,
@@ -101,7 +101,7 @@ fn simulations() -> usize {
 /// Largest number of simulated data sets.
 const MOST: usize = 100_000;
 
-impl Component for Distance {
+impl Component for ApproximateBayesianComputation {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         let layout = context.layout;
         self.by.check("by", layout, complaints);
@@ -129,7 +129,7 @@ impl Component for Distance {
     }
 }
 
-impl Distance {
+impl ApproximateBayesianComputation {
     /// Reports options of the axis that contradict each other or the response.
     fn check_order(&self, layout: &Layout, complaints: &mut Complaints<'_>) {
         if self.axis_weight.is_none() {
@@ -192,7 +192,7 @@ impl Distance {
     }
 }
 
-impl Discrepancy for Distance {
+impl Discrepancy for ApproximateBayesianComputation {
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
         let replicates = Replicates::of(known.data, known.common)?;
         let layout = &known.data.layout;
@@ -219,4 +219,4 @@ impl Discrepancy for Distance {
     }
 }
 
-lacuna::register!(Discrepancy, "distance", Distance, aliases: ["approximate_bayesian_computation"]);
+lacuna::register!(Discrepancy, "approximate_bayesian_computation", ApproximateBayesianComputation, aliases: ["abc"]);
