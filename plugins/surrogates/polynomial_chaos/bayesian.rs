@@ -42,7 +42,7 @@ impl Parts {
             let part = |first: usize| {
                 let runs: Vec<usize> = order.iter().copied().skip(first).step_by(PARTS).collect();
                 let own = columns.select_rows(&runs);
-                let mut others = dictionary.gram().clone();
+                let mut others = dictionary.gram().into_owned();
                 let squares = gram(&own);
                 vector::add_scaled(others.as_mut_slice(), -1.0, squares.as_slice());
                 Part { runs, columns: own, gram: others }
@@ -98,7 +98,7 @@ pub(super) fn bayesian(
         }
     }
     let mut set = ActiveSet::new(dictionary);
-    for term in Ascent::new(dictionary.gram(), &open, correlations, noise).run(most).active {
+    for term in Ascent::new(&dictionary.gram(), &open, correlations, noise).run(most).active {
         set.enter(term);
     }
     if set.terms().is_empty() {

@@ -11,6 +11,8 @@
 use lacuna_linalg::level::{Lines, first_meeting, least_gaps};
 use lacuna_linalg::{Matrix, vector};
 
+use super::dictionary::Dictionary;
+
 /// Number of steps within which a candidate could enter, to count as near.
 const HORIZON: f64 = 8.0;
 /// Allowance of the bound for rounding errors, relative to the level.
@@ -36,7 +38,7 @@ pub(super) struct Arrival {
 
 /// Candidates and their correlations with the residual.
 pub(super) struct Candidates<'a> {
-    gram: &'a Matrix,
+    dictionary: &'a Dictionary,
     /// Zero for candidates; infinity for active and dependent columns.
     closed: Vec<f64>,
     /// All correlations at the last evaluation of all candidates, and their rates of decrease there.
@@ -85,12 +87,12 @@ struct Near {
 }
 
 impl<'a> Candidates<'a> {
-    /// Returns all candidates at the start of the path; `open` tells which columns may enter at all.
-    pub fn new(gram: &'a Matrix, correlations: &[f64], open: impl Iterator<Item = bool>) -> Self {
+    /// Returns all candidates at the start of the path; only columns that vary may enter at all.
+    pub fn new(dictionary: &'a Dictionary, correlations: &[f64]) -> Self {
         let n = correlations.len();
         Self {
-            gram,
-            closed: open.map(|open| if open { 0.0 } else { f64::INFINITY }).collect(),
+            dictionary,
+            closed: dictionary.varies().map(|open| if open { 0.0 } else { f64::INFINITY }).collect(),
             correlations: correlations.to_vec(),
             rates: vec![0.0; n],
             scratch: vec![0.0; n],
@@ -165,13 +167,13 @@ impl<'a> Candidates<'a> {
     /// Updates all correlations and rates to the present point of the path.
     fn look_at_all(&mut self, direction: &Direction<'_>) {
         let Direction { active, weights, .. } = *direction;
-        let Self { gram, rates, scratch, since, .. } = self;
+        let Self { dictionary, rates, scratch, since, .. } = self;
         if since.fallen > 0.0 {
             since.shifts.resize(active.len(), 0.0);
-            vector::combine_rows_twice(gram, active, [weights, &since.shifts], [rates, scratch]);
+            dictionary.combine_twice(active, [weights, &since.shifts], [rates, scratch]);
             vector::add_scaled(&mut self.correlations, -1.0, scratch);
         } else {
-            vector::combine_rows(gram, active, weights, rates);
+            dictionary.combine(active, weights, rates);
         }
         self.since = Since::default();
     }
@@ -191,7 +193,7 @@ impl<'a> Candidates<'a> {
             return;
         }
         self.since = Since { clearance, horizon, ..Since::default() };
-        self.near.pack(direction.active, self.gram, &self.correlations, &self.rates);
+        self.near.pack(direction.active, self.dictionary, &self.correlations, &self.rates);
     }
 
     /// Removes a term from the candidates.
@@ -210,7 +212,7 @@ impl<'a> Candidates<'a> {
             return;
         }
         self.since.turns.push((length, self.since.fallen));
-        self.near.push(self.gram.row(entered));
+        self.near.push(self.dictionary.products(entered));
         let Near { gram, rows, rates, .. } = &mut self.near;
         vector::combine_rows(gram, rows, weights, rates);
     }
@@ -262,14 +264,20 @@ impl Near {
     }
 
     /// Copies the data of the selected terms.
-    fn pack(&mut self, active: &[usize], gram: &Matrix, correlations: &[f64], rates: &[f64]) {
+    fn pack(
+        &mut self,
+        active: &[usize],
+        dictionary: &Dictionary,
+        correlations: &[f64],
+        rates: &[f64],
+    ) {
         self.correlations.extend(self.terms.iter().map(|&t| correlations[t]));
         self.rates.extend(self.terms.iter().map(|&t| rates[t]));
         self.closed.resize(self.terms.len(), 0.0);
         self.scratch.resize(self.terms.len(), 0.0);
         self.gram.clear(self.terms.len());
         for &t in active {
-            self.push(gram.row(t));
+            self.push(dictionary.products(t));
         }
     }
 

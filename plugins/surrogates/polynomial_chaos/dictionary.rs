@@ -1,6 +1,10 @@
 //! Basis functions at the runs, and sets of them that grow one by one.
 
+use std::borrow::Cow;
+
 use lacuna_linalg::{Matrix, PackedUpper, gram, multiply, vector};
+
+use super::gram::Gram;
 
 /// Squared fraction of a new column outside the span of the active ones below which it counts as dependent.
 const DEPENDENT: f64 = 1e-8;
@@ -9,15 +13,16 @@ const DEPENDENT: f64 = 1e-8;
 pub(super) struct Dictionary {
     /// Standardised basis functions (`terms x runs`); zero for those that are constant over the runs.
     columns: Matrix,
-    gram: Matrix,
+    gram: Gram,
     means: Vec<f64>,
     /// Length of each centred basis function; zero for a constant.
     lengths: Vec<f64>,
 }
 
 impl Dictionary {
-    /// Standardises the basis functions at the runs (`runs x terms`).
-    pub fn new(basis: &Matrix) -> Self {
+    /// Standardises the basis functions at the runs (`runs x terms`). All inner products are computed at once if
+    /// `whole`, otherwise those of the selected terms.
+    pub fn new(basis: &Matrix, whole: bool) -> Self {
         let mut columns = basis.transposed();
         let runs = columns.columns();
         let (mut means, mut lengths) = (Vec::new(), Vec::new());
@@ -36,7 +41,7 @@ impl Dictionary {
             means.push(mean);
             lengths.push(if varies { length } else { 0.0 });
         }
-        let gram = gram(&columns.transposed());
+        let gram = if whole { Gram::whole(&columns) } else { Gram::rows(columns.rows()) };
         Self { columns, gram, means, lengths }
     }
 
@@ -45,9 +50,27 @@ impl Dictionary {
         &self.columns
     }
 
-    /// Returns their inner products (`terms x terms`).
-    pub fn gram(&self) -> &Matrix {
-        &self.gram
+    /// Returns the inner products of one basis function with all of them.
+    pub fn products(&self, term: usize) -> &[f64] {
+        self.gram.row(&self.columns, term)
+    }
+
+    /// Returns all inner products (`terms x terms`), which are computed now if they are not known.
+    pub fn gram(&self) -> Cow<'_, Matrix> {
+        match &self.gram {
+            Gram::Whole(matrix) => Cow::Borrowed(matrix),
+            Gram::Rows(_) => Cow::Owned(gram(&self.columns.transposed())),
+        }
+    }
+
+    /// Writes `sum_i weights[i] * products(terms[i])` to `out`.
+    pub fn combine(&self, terms: &[usize], weights: &[f64], out: &mut [f64]) {
+        self.gram.combine(&self.columns, terms, weights, out);
+    }
+
+    /// Two combinations of the same rows of inner products.
+    pub fn combine_twice(&self, terms: &[usize], weights: [&[f64]; 2], out: [&mut [f64]; 2]) {
+        self.gram.combine_twice(&self.columns, terms, weights, out);
     }
 
     /// Tells for each basis function if it varies over the runs.
@@ -106,7 +129,7 @@ impl<'a> ActiveSet<'a> {
 
     /// Adds a term; returns false if it depends linearly on the active ones.
     pub fn enter(&mut self, term: usize) -> bool {
-        let gram = self.dictionary.gram.row(term);
+        let gram = self.dictionary.products(term);
         let Self { products, next, inverse, .. } = self;
         products.clear();
         products.extend(self.terms.iter().map(|&t| gram[t]));

@@ -21,6 +21,9 @@ use crate::surrogates::principal_components::PrincipalComponents;
 /// what is left are rounding errors (such as the strain of a sensor before the wave arrives).
 const ROUND_OFF: f64 = 1e-13;
 
+/// Largest degree that is low enough for a warning if the number of terms allows no higher one.
+const LOW_DEGREE: usize = 2;
+
 /// Fits of all outputs, or of all components, side by side.
 struct Fits {
     terms: Basis,
@@ -69,6 +72,7 @@ pub(super) fn fit(
         None => problem.fits(&outputs, progress)?.expansion(None),
     };
     warn(&expansion, runs, training.parameters.len(), progress);
+    warn_of_limit(options, &expansion, training.parameters.len(), progress);
     Ok(expansion)
 }
 
@@ -144,6 +148,25 @@ fn warn(expansion: &Expansion, runs: usize, dimension: usize, progress: &Progres
         progress.warn(&format!(
             "{runs} runs are fewer than {why}: the surrogate's leave-one-out errors are likely too small; \
              use the errors at `validation` runs instead"
+        ));
+    }
+}
+
+/// Warns if the maximum number of terms allows a low degree only and outputs use it.
+fn warn_of_limit(
+    options: &PolynomialChaos,
+    expansion: &Expansion,
+    dimension: usize,
+    progress: &Progress<'_>,
+) {
+    let largest = options.largest_degree(dimension);
+    let used = expansion.summary().degrees.iter().any(|&degree| degree == largest);
+    if used && largest <= LOW_DEGREE && largest < options.degree.range().max {
+        progress.warn(&format!(
+            "degree {} in {dimension} parameters has more than {} terms and was not tried; `q_norm = 0.75` or \
+             `max_interaction = 1` in `[surrogate]` leave out products and allow higher degrees",
+            largest + 1,
+            options.most_terms(dimension)
         ));
     }
 }

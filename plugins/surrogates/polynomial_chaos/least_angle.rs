@@ -4,8 +4,8 @@
 //! term ever leaves it. At each step the terms so far are refitted by least squares and assessed by their corrected
 //! leave-one-out error ("hybrid" selection: Blatman and Sudret 2011), which is exactly the error of the final model.
 //!
-//! The speed comes from four things: the Gram matrix is shared by all outputs, so that the path does not depend on
-//! the number of runs; only candidates that can enter are followed ([`super::candidates`]); the inverse Cholesky
+//! The speed comes from four things: inner products of the basis functions are shared by all outputs, so that the
+//! path does not depend on the number of runs; only candidates that can enter are followed ([`super::candidates`]); the inverse Cholesky
 //! factor of the active Gram matrix grows by one column per step; and the orthonormal columns needed for leverages
 //! and residuals are computed for a block of steps at a time by one matrix product.
 
@@ -31,7 +31,7 @@ impl<'a> LeastAngle<'a> {
     pub fn new(dictionary: &'a Dictionary, correlations: &[f64]) -> Self {
         Self {
             active: ActiveSet::new(dictionary),
-            candidates: Candidates::new(dictionary.gram(), correlations, dictionary.varies()),
+            candidates: Candidates::new(dictionary, correlations),
             level: 0.0,
             signs: Vec::new(),
             weights: Vec::new(),

@@ -59,7 +59,7 @@ impl<'a> Path<'a> for MatchingPursuit<'a> {
             }
             let (terms, next) = (self.active.terms(), self.active.last_column());
             let projection: f64 = next.iter().zip(terms).map(|(x, &t)| x * self.start[t]).sum();
-            vector::combine_rows(self.dictionary.gram(), terms, next, &mut self.scratch);
+            self.dictionary.combine(terms, next, &mut self.scratch);
             vector::add_scaled(&mut self.correlations, -projection, &self.scratch);
             return true;
         }

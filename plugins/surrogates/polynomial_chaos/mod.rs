@@ -8,6 +8,7 @@ mod dictionary;
 mod emulator;
 mod family;
 mod fit;
+mod gram;
 mod judge;
 mod least_angle;
 mod least_squares;
@@ -90,8 +91,9 @@ pub struct PolynomialChaos {
     pub q_norm: QNorm,
     /// Maximum number of parameters in one product. Default: no limit.
     pub max_interaction: Option<usize>,
-    /// Maximum number of terms of a degree; degrees with more terms are not tried.
-    pub max_terms: usize,
+    /// Maximum number of terms of a degree; degrees with more terms are not tried. Default: 4000, or as many as degree
+    /// 2 has if these are more and at most 20,000 (5151 in 100 parameters).
+    pub max_terms: Option<usize>,
     /// Conditions that end the search for a better expansion.
     pub early_stop: EarlyStop,
     /// Error by which terms, degrees and norms are chosen.
@@ -110,7 +112,7 @@ impl Default for PolynomialChaos {
             degree: Degree::default(),
             q_norm: QNorm::Fixed(1.0),
             max_interaction: None,
-            max_terms: 4000,
+            max_terms: None,
             early_stop: EarlyStop::default(),
             selection: Selection::default(),
             components: None,
@@ -120,6 +122,11 @@ impl Default for PolynomialChaos {
 
 /// Highest degree that may be requested.
 const MOST_DEGREES: usize = 1000;
+
+/// Maximum number of terms of a degree, if the study does not say.
+const USUAL_TERMS: usize = 4000;
+/// Number of terms of degree 2 up to which they are always allowed, if the study does not say.
+const MOST_QUADRATIC: usize = 20_000;
 
 /// An error of the options in the context of the study.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -131,11 +138,25 @@ struct Fault {
 }
 
 impl PolynomialChaos {
+    /// Returns the maximum number of terms of a degree in `dimension` parameters.
+    fn most_terms(&self, dimension: usize) -> usize {
+        let quadratic = (dimension + 1).saturating_mul(dimension + 2) / 2;
+        let room = if quadratic <= MOST_QUADRATIC { quadratic } else { 0 };
+        self.max_terms.unwrap_or(USUAL_TERMS.max(room))
+    }
+
     /// Returns the nested sets of terms of one norm in `dimension` parameters.
     fn nested(&self, dimension: usize, q_norm: f64) -> Nested {
         let max_interaction = self.max_interaction.unwrap_or(dimension);
         let truncation = Truncation { q_norm, max_interaction };
-        Nested::new(dimension, self.degree.range().max, truncation, self.max_terms)
+        Nested::new(dimension, self.degree.range().max, truncation, self.most_terms(dimension))
+    }
+
+    /// Returns the largest degree that is tried with any norm.
+    fn largest_degree(&self, dimension: usize) -> usize {
+        let norms = self.q_norm.values().unwrap_or_default();
+        let largest = |q| self.nested(dimension, q).counts.len() - 1;
+        norms.into_iter().map(largest).max().unwrap_or(0)
     }
 
     /// Returns the sets of terms to be tried.
@@ -223,7 +244,7 @@ impl PolynomialChaos {
                 key: "degree",
                 message: format!(
                     "degree {min} in {dimension} parameters has more than `max_terms` = {} terms",
-                    self.max_terms
+                    self.most_terms(dimension)
                 ),
                 help: format!("the largest degree that fits is {}", counts.len() - 1),
             });
@@ -247,7 +268,7 @@ impl PolynomialChaos {
         }
         let terms = counts
             .get(max)
-            .map_or_else(|| format!("more than {}", self.max_terms), ToString::to_string);
+            .map_or_else(|| format!("more than {}", self.most_terms(dimension)), ToString::to_string);
         Some(Fault {
             key: "degree",
             message: format!(
@@ -293,4 +314,4 @@ impl Surrogate for PolynomialChaos {
     }
 }
 
-lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"]);
+lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"], revision = 2);

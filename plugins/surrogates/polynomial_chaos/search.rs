@@ -10,6 +10,7 @@ use super::PolynomialChaos;
 use super::bayesian::{Parts, bayesian};
 use super::coordinate::Coordinate;
 use super::dictionary::Dictionary;
+use super::gram::Gram;
 use super::judge::{Choice, Criterion, best_along};
 use super::least_angle::LeastAngle;
 use super::least_squares::{Fit, Regression};
@@ -148,8 +149,11 @@ impl Search<'_> {
     }
 
     fn sparse(&self, set: &TermSet, outputs: &[Output], active: &[usize]) -> Vec<Option<Best>> {
-        let dictionary = Dictionary::new(&self.basis(&set.members));
         let runs = self.points.rows();
+        // Sparse Bayesian learning follows the statistics of every term.
+        let whole = self.options.solver == Solver::BayesianCompressiveSensing
+            || Gram::needs_all(set.members.len(), runs, active.len());
+        let dictionary = Dictionary::new(&self.basis(&set.members), whole);
         let centred = Matrix::from_rows(runs, active.iter().map(|&o| &outputs[o].centred));
         let correlations = multiply_transposed(&centred, dictionary.columns());
         let parts = Parts::default();

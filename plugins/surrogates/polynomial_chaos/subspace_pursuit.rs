@@ -80,7 +80,7 @@ fn pursue<'a>(
     let (mut weights, mut explained) = set.solve(correlations);
     let mut residual = vec![0.0; correlations.len()];
     for _ in 0..ROUNDS {
-        vector::combine_rows(dictionary.gram(), set.terms(), &weights, &mut residual);
+        dictionary.combine(set.terms(), &weights, &mut residual);
         residual.iter_mut().zip(correlations).for_each(|(r, c)| *r = c - *r);
         let mut wide = set.clone();
         let others: Vec<usize> =

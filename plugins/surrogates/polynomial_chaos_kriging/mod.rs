@@ -178,4 +178,4 @@ impl Surrogate for PolynomialChaosKriging {
     }
 }
 
-lacuna::register!(Surrogate, "polynomial_chaos_kriging", PolynomialChaosKriging, aliases: ["pck", "pc_kriging", "pce_kriging"]);
+lacuna::register!(Surrogate, "polynomial_chaos_kriging", PolynomialChaosKriging, aliases: ["pck", "pc_kriging", "pce_kriging"], revision = 2);

@@ -44,7 +44,7 @@ fn options_that_cannot_work_are_named() {
     let wrong =
         PolynomialChaos { q_norm: QNorm::Fixed(0.0), max_interaction: Some(0), ..of_degree(0) };
     assert_eq!(keys(&wrong, None), ["degree", "q_norm", "max_interaction"]);
-    assert_eq!(keys(&PolynomialChaos { max_terms: 100, ..of_degree(20) }, None), ["degree"]);
+    assert_eq!(keys(&PolynomialChaos { max_terms: Some(100), ..of_degree(20) }, None), ["degree"]);
     let dense = PolynomialChaos { solver: Solver::LeastSquares, ..of_degree(8) };
     assert_eq!(keys(&dense, Some(165)), ["degree"]);
     assert!(keys(&dense, Some(166)).is_empty() && keys(&dense, None).is_empty());
