@@ -2,6 +2,7 @@
 
 use lacuna::math::random::{Stream, permutation};
 use lacuna::plugin::Forward as _;
+use lacuna::plugin::forward::Linear as _;
 use lacuna::plugin::surrogate::{FitError, Training};
 use lacuna::run::{Progress, Silent, Stop};
 use lacuna_linalg::{Matrix, multiply_transposed};
@@ -65,7 +66,8 @@ pub(super) fn fit(
         c => parts.directions[(j, c - 1)],
     });
     let components = found.into_iter().map(|found| found.component).collect();
-    Ok(Reduced { inputs, components, loadings, folds: problem.folds.len(), fit_error })
+    let folds = problem.folds.len();
+    Ok(Reduced { inputs, components, loadings, folds, fit_error })
 }
 
 /// Divides the runs into groups at random.

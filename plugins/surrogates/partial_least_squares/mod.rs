@@ -98,12 +98,14 @@ impl PartialLeastSquares {
                 format!("the degrees must be an increasing range from 1 to {MOST_DEGREES}, not {min} to {max}"),
             ));
         }
-        let least = min.saturating_add(1);
-        if self.max_terms < least {
-            let found = self.max_terms;
+        let least = terms(self.max_directions, min);
+        if least > self.max_terms as f64 {
+            let (most, found) = (self.max_directions, self.max_terms);
             faults.push((
                 "max_terms",
-                format!("degree {min} along one direction has {least} terms, more than `max_terms` = {found}"),
+                format!(
+                    "degree {min} in {most} directions has {least} terms, more than `max_terms` = {found}"
+                ),
             ));
         }
         if self.folds < 2 {
@@ -120,6 +122,11 @@ impl PartialLeastSquares {
         faults.extend(self.components.fault().map(|words| ("components", words)));
         faults
     }
+}
+
+/// Returns the number of polynomials of at most this degree in that many variables, `C(variables + degree, degree)`.
+fn terms(variables: usize, degree: usize) -> f64 {
+    (1..=degree.min(MOST_DEGREES)).fold(1.0, |n, k| n * (variables + k) as f64 / k as f64).round()
 }
 
 impl Component for PartialLeastSquares {

@@ -341,7 +341,8 @@ fn bayesian_sensing_ends_at_a_maximum_of_the_marginal_likelihood() {
     let correlations = multiply_vector(dictionary.columns(), &centred);
     let noise = 0.1 * centred.iter().map(|v| v * v).sum::<f64>() / 40.0;
     let open: Vec<bool> = dictionary.varies().collect();
-    let found = Ascent::new(&dictionary.gram(), &open, &correlations, noise).run(30);
+    let gram = dictionary.gram();
+    let found = Ascent::new(&gram, &open, &correlations, noise).run(30);
     let evidence = |variances: &[f64]| {
         let covariance = Matrix::from_fn(40, 40, |i, j| {
             let column = |t: usize| dictionary.columns()[(t, i)] * dictionary.columns()[(t, j)];
