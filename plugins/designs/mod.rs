@@ -2,6 +2,7 @@
 
 pub mod ensemble_kalman;
 pub mod latin_hypercube;
+pub mod morris;
 pub mod quadrature;
 pub mod random;
 pub mod sobol;

@@ -2,7 +2,6 @@
 
 pub mod gaussian_process;
 pub mod kriging;
-pub mod partial_least_squares;
 pub mod polynomial_chaos;
 pub mod polynomial_chaos_kriging;
 pub mod principal_components;

@@ -15,6 +15,7 @@ pub mod page;
 pub mod pipeline;
 pub mod posterior;
 pub mod report;
+pub mod screening;
 pub mod sensitivity;
 pub mod serve;
 pub mod stage;

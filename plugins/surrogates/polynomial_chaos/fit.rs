@@ -22,7 +22,7 @@ use crate::surrogates::principal_components::PrincipalComponents;
 const ROUND_OFF: f64 = 1e-13;
 
 /// Largest degree that is low enough for a warning if the number of terms allows no higher one.
-const LOW_DEGREE: usize = 2;
+const LOW_DEGREE: usize = 3;
 
 /// Fits of all outputs, or of all components, side by side.
 struct Fits {
@@ -72,7 +72,7 @@ pub(super) fn fit(
         None => problem.fits(&outputs, progress)?.expansion(None),
     };
     warn(&expansion, runs, training.parameters.len(), progress);
-    warn_of_limit(options, &expansion, training.parameters.len(), progress);
+    problem.warn_of_limit(&expansion, progress);
     Ok(expansion)
 }
 
@@ -152,25 +152,6 @@ fn warn(expansion: &Expansion, runs: usize, dimension: usize, progress: &Progres
     }
 }
 
-/// Warns if the maximum number of terms allows a low degree only and outputs use it.
-fn warn_of_limit(
-    options: &PolynomialChaos,
-    expansion: &Expansion,
-    dimension: usize,
-    progress: &Progress<'_>,
-) {
-    let largest = options.largest_degree(dimension);
-    let used = expansion.summary().degrees.iter().any(|&degree| degree == largest);
-    if used && largest <= LOW_DEGREE && largest < options.degree.range().max {
-        progress.warn(&format!(
-            "degree {} in {dimension} parameters has more than {} terms and was not tried; `q_norm = 0.75` or \
-             `max_interaction = 1` in `[surrogate]` leave out products and allow higher degrees",
-            largest + 1,
-            options.most_terms(dimension)
-        ));
-    }
-}
-
 /// Data shared by the fits of all outputs.
 struct Problem<'a> {
     options: &'a PolynomialChaos,
@@ -182,6 +163,21 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
+    /// Warns if the maximum number of terms allows a low degree only and outputs use it.
+    fn warn_of_limit(&self, expansion: &Expansion, progress: &Progress<'_>) {
+        let dimension = self.coordinates.len();
+        let largest = self.sets.sets.iter().map(|set| set.degree).max().unwrap_or(0);
+        let used = expansion.summary().degrees.contains(&largest);
+        if used && largest <= LOW_DEGREE && largest < self.options.degree.range().max {
+            progress.warn(&format!(
+                "degree {} in {dimension} parameters has more than {} terms and was not tried: raise `max_terms` in \
+                 `[surrogate]`, or leave out products with `max_interaction = 1`",
+                largest + 1,
+                self.options.most_terms(dimension)
+            ));
+        }
+    }
+
     /// Fails if the quadrature rule determines none of the requested degrees.
     fn check_level(&self) -> Result<(), Stop> {
         let least = self.options.degree.range().min;

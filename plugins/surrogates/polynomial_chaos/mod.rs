@@ -87,12 +87,12 @@ pub struct PolynomialChaos {
     /// Norm `q` that truncates the basis: degree `p` includes the products whose exponents satisfy
     /// `(sum of exponent^q)^(1 / q) <= p`. Above 0, at most 1. With 1 this is the total degree; smaller values leave
     /// out products of many parameters. From a list, or a range such as `{ min = 0.5, max = 1.0, step = 0.1 }`, each
-    /// output takes the norm with the smallest error.
-    pub q_norm: QNorm,
-    /// Maximum number of parameters in one product. Default: no limit.
+    /// output takes the norm with the smallest error. Default: 1; with more than 15 parameters `[0.5, 0.75]`.
+    pub q_norm: Option<QNorm>,
+    /// Maximum number of parameters in one product. Default: no limit; with more than 15 parameters 2.
     pub max_interaction: Option<usize>,
-    /// Maximum number of terms of a degree; degrees with more terms are not tried. Default: 4000, or as many as degree
-    /// 2 has if these are more and at most 20,000 (5151 in 100 parameters).
+    /// Maximum number of terms of a degree; degrees with more terms are not tried. Default: 4000; with more than 15
+    /// parameters 20,000.
     pub max_terms: Option<usize>,
     /// Conditions that end the search for a better expansion.
     pub early_stop: EarlyStop,
@@ -110,7 +110,7 @@ impl Default for PolynomialChaos {
             basis: Family::default(),
             solver: Solver::default(),
             degree: Degree::default(),
-            q_norm: QNorm::Fixed(1.0),
+            q_norm: None,
             max_interaction: None,
             max_terms: None,
             early_stop: EarlyStop::default(),
@@ -123,10 +123,12 @@ impl Default for PolynomialChaos {
 /// Highest degree that may be requested.
 const MOST_DEGREES: usize = 1000;
 
-/// Maximum number of terms of a degree, if the study does not say.
-const USUAL_TERMS: usize = 4000;
-/// Number of terms of degree 2 up to which they are always allowed, if the study does not say.
-const MOST_QUADRATIC: usize = 20_000;
+/// Number of parameters above which the basis has fewer products by default: there are too many to choose from.
+const FEW_PARAMETERS: usize = 15;
+/// Norms for more parameters, if the study does not say.
+const NORMS_OF_MANY: [f64; 2] = [0.5, 0.75];
+/// Maximum number of terms of a degree for few and for many parameters, if the study does not say.
+const USUAL_TERMS: [usize; 2] = [4000, 20_000];
 
 /// An error of the options in the context of the study.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -140,28 +142,29 @@ struct Fault {
 impl PolynomialChaos {
     /// Returns the maximum number of terms of a degree in `dimension` parameters.
     fn most_terms(&self, dimension: usize) -> usize {
-        let quadratic = (dimension + 1).saturating_mul(dimension + 2) / 2;
-        let room = if quadratic <= MOST_QUADRATIC { quadratic } else { 0 };
-        self.max_terms.unwrap_or(USUAL_TERMS.max(room))
+        self.max_terms.unwrap_or(USUAL_TERMS[usize::from(dimension > FEW_PARAMETERS)])
+    }
+
+    /// Returns the norms to be tried in `dimension` parameters, or a description of what is wrong with them.
+    fn norms(&self, dimension: usize) -> Result<Vec<f64>, String> {
+        match &self.q_norm {
+            Some(norm) => norm.values(),
+            None if dimension > FEW_PARAMETERS => Ok(NORMS_OF_MANY.to_vec()),
+            None => Ok(vec![1.0]),
+        }
     }
 
     /// Returns the nested sets of terms of one norm in `dimension` parameters.
     fn nested(&self, dimension: usize, q_norm: f64) -> Nested {
-        let max_interaction = self.max_interaction.unwrap_or(dimension);
+        let usual = if dimension > FEW_PARAMETERS { 2 } else { dimension };
+        let max_interaction = self.max_interaction.unwrap_or(usual);
         let truncation = Truncation { q_norm, max_interaction };
         Nested::new(dimension, self.degree.range().max, truncation, self.most_terms(dimension))
     }
 
-    /// Returns the largest degree that is tried with any norm.
-    fn largest_degree(&self, dimension: usize) -> usize {
-        let norms = self.q_norm.values().unwrap_or_default();
-        let largest = |q| self.nested(dimension, q).counts.len() - 1;
-        norms.into_iter().map(largest).max().unwrap_or(0)
-    }
-
     /// Returns the sets of terms to be tried.
     fn sets(&self, dimension: usize) -> Sets {
-        let norms = self.q_norm.values().unwrap_or_default();
+        let norms = self.norms(dimension).unwrap_or_default();
         let families: Vec<(f64, Nested)> =
             norms.into_iter().map(|q| (q, self.nested(dimension, q))).collect();
         Sets::new(dimension, self.degree.range().min, &families)
@@ -208,7 +211,7 @@ impl PolynomialChaos {
             );
             add("degree", message, "write `degree = { min = 1, max = 20 }` or a whole number");
         }
-        if let Err(message) = self.q_norm.values() {
+        if let Err(message) = self.norms(0) {
             add("q_norm", message, "1 is the total degree; values from 0.4 to 1 are usual");
         }
         if self.max_interaction == Some(0) {
@@ -237,7 +240,7 @@ impl PolynomialChaos {
     fn fault_of_size(&self, dimension: usize, runs: Option<usize>) -> Option<Fault> {
         let DegreeRange { min, max } = self.degree.range();
         // The smallest norm has the smallest number of terms.
-        let norm = self.q_norm.values().ok()?.into_iter().next()?;
+        let norm = self.norms(dimension).ok()?.into_iter().next()?;
         let counts = self.nested(dimension, norm).counts;
         if counts.len() <= min {
             return Some(Fault {

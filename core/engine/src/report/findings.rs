@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::assess::Assessment;
+use crate::screening::Screening;
 
 pub use crate::gap::result::GapFindings;
 use crate::stage::calibrate::PopulationOutcome;
@@ -80,6 +81,8 @@ pub struct EnsembleFindings {
     pub failed: Vec<FailedRun>,
     /// Number of runs inside the prior's support.
     pub in_prior: usize,
+    /// What the runs show of the inputs, one entry per input.
+    pub screening: Option<Screening>,
 }
 
 /// An input that the runs vary: a parameter, or one of which each group has its own value in the calibration.

@@ -2,6 +2,7 @@
 
 use lacuna::data::{Draws, Ensemble, Observations, Parameter};
 use lacuna::diagnose::Diagnosis;
+use lacuna::math::distribution::Distribution;
 use lacuna::math::moments::Moments;
 use lacuna::math::{fit, moments};
 use lacuna::run::{Observer, Stop, files};
@@ -16,6 +17,7 @@ use crate::report::findings::{
     FittedDistribution, LeftOutFindings, MeasuredFindings, Role, RunInput, SurrogateFindings,
 };
 use crate::report::{render, summary};
+use crate::screening::{Screening, screen};
 use crate::stage::artifacts::Artifacts;
 use crate::stage::calibrate::Calibrated;
 use crate::stage::derived;
@@ -121,7 +123,21 @@ fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
         valid: e.valid.clone(),
         failed: e.failed.clone(),
         in_prior: e.points.iter_rows().filter(inside).count(),
+        screening: screening(study, e),
     }
+}
+
+/// What the runs show of the inputs; `None` if there is more than one simulator behind them or too few runs.
+fn screening(study: &Study, e: &Ensemble) -> Option<Screening> {
+    let trained = study.trained();
+    let designs: Vec<&Distribution> = trained.parameters.iter().map(|p| &p.design).collect();
+    if designs.len() != e.points.columns() {
+        return None;
+    }
+    let positions = Matrix::from_fn(e.points.rows(), designs.len(), |i, j| {
+        designs[j].cdf(e.points[(i, j)])
+    });
+    screen(&positions, &e.responses, e.layouts.ranges())
 }
 
 fn inputs(study: &Study) -> Vec<RunInput> {

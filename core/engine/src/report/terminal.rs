@@ -5,7 +5,7 @@ use lacuna::run::Stop;
 use super::findings::Findings;
 use super::section::{
     accuracy_table, banner, evidence, group_word, headline, population_table, posterior_table,
-    quantity_table, reliability_table, share_table, view, without_table,
+    quantity_table, reliability_table, screening, share_table, view, without_table,
 };
 use crate::gap::next::Wanted;
 use crate::gap::report;
@@ -20,6 +20,9 @@ pub fn summary_text(findings: &Findings) -> String {
         parts.push(lines.join("\n") + "\n");
     }
     parts.push(headline::sentences(findings).join("\n") + "\n");
+    if let Some(sentence) = findings.ensemble.as_ref().and_then(screening::sentence) {
+        parts.push(sentence + "\n");
+    }
     if let Some(calibration) = &findings.calibration {
         parts.push(posterior_table(calibration).text());
         if !calibration.populations.is_empty() {

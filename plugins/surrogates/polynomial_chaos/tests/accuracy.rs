@@ -55,7 +55,7 @@ fn the_borehole_is_as_accurate_as_elsewhere() {
 #[test]
 fn every_row_of_the_table_is_reached_with_adapted_norms() {
     let q_norm = QNorm::Range(QNormRange::default());
-    let options = PolynomialChaos { q_norm, max_terms: Some(1300), ..PolynomialChaos::default() };
+    let options = PolynomialChaos { q_norm: Some(q_norm), max_terms: Some(1300), ..PolynomialChaos::default() };
     for (function, max, bounds) in [
         (CIRCUIT, 8, [3.4e-5, 2.5e-6, 1.3e-8]),
         (BOREHOLE, 6, [3.4e-5, 2.8e-5, 9.0e-7]),
@@ -78,7 +78,7 @@ fn indices_of_the_g_function_are_near_their_closed_forms() {
     let parts = SOBOL_G_WEIGHTS.map(|a| 1.0 / (3.0 * (1.0 + a).powi(2)));
     let variance = parts.iter().map(|v| 1.0 + v).product::<f64>() - 1.0;
     let q_norm = QNorm::Range(QNormRange::default());
-    let options = PolynomialChaos { q_norm, ..up_to(1, 12) };
+    let options = PolynomialChaos { q_norm: Some(q_norm), ..up_to(1, 12) };
     let indices = SOBOL_G.fit(&options, &sobol(603, 8)).sensitivity().unwrap();
     for (i, v) in parts.iter().enumerate() {
         let others = parts.iter().map(|v| 1.0 + v).product::<f64>() / (1.0 + v);

@@ -100,7 +100,7 @@ fn norms_are_chosen_for_each_output() {
         if o == 0 { x.iter().map(|x| (7.0 * x).sin()).sum() } else { (x[0] + x[1] + x[2]).exp() }
     });
     let q_norm = QNorm::Range(QNormRange { min: 0.4, max: 1.0, step: 0.2 });
-    let options = PolynomialChaos { q_norm, ..up_to(1, 14) };
+    let options = PolynomialChaos { q_norm: Some(q_norm), ..up_to(1, 14) };
     let parameters = parameters(&[[0.0, 1.0]; 3]);
     let both = fitted_to(&options, &parameters, &points, &responses).unwrap();
     let norms = &both.summary().q_norms;
@@ -114,7 +114,7 @@ fn norms_are_chosen_for_each_output() {
 /// Compares the sets that are tried with their definition.
 #[test]
 fn sets_of_several_norms_are_those_of_each() {
-    let options = PolynomialChaos { q_norm: QNorm::List(vec![1.0, 0.5, 0.75]), ..up_to(2, 6) };
+    let options = PolynomialChaos { q_norm: Some(QNorm::List(vec![1.0, 0.5, 0.75])), ..up_to(2, 6) };
     let sets = options.sets(3);
     for set in &sets.sets {
         let nested = options.nested(3, set.q_norm);

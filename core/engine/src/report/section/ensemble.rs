@@ -2,7 +2,7 @@
 
 use maud::html;
 
-use super::{first_of, titled};
+use super::{first_of, screening, titled};
 use crate::page::chart::{DesignColumn, Key, MOST_CROSSED, design_matrix};
 use crate::page::number::count;
 use crate::page::scale::ShownUnit;
@@ -26,6 +26,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
             (count(ensemble.failed.len())) " runs were left out."
         }
         @if runs > 0 { (figure(findings, ensemble, numbers)) }
+        (screening::part(ensemble, numbers))
         @if !ensemble.failed.is_empty() { (failures(ensemble, numbers)) }
     };
     Some(Section { id: "ensemble", title: "Simulation ensemble", content })

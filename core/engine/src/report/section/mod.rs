@@ -12,6 +12,7 @@ mod posterior;
 mod quantities;
 mod reliability;
 mod sampling;
+pub mod screening;
 mod surrogate;
 mod timing;
 mod validation;

@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::value::{ByName, Quantity};
 use crate::report::findings::{EnsembleFindings, MeasuredFindings};
+use crate::screening::Screening;
 
 /// Numbers of simulation runs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -16,17 +18,60 @@ pub struct Runs {
     pub invalid: usize,
     /// Number of runs inside the support of the prior.
     pub in_prior: usize,
+    /// What the runs show of each input, without a surrogate.
+    #[serde(skip_serializing_if = "ByName::is_empty")]
+    #[schemars(extend("propertyNames" = { "title": "input" }))]
+    pub screening: ByName<ScreenedInput>,
+}
+
+/// What the runs show of an input: from runs along trajectories (the design `morris`) its elementary effects, from other
+/// runs a test of independence.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ScreenedInput {
+    /// Dependence of the response on the input, from 0 to 1: the Hilbert-Schmidt independence criterion, normalised.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hsic: Option<Quantity>,
+    /// Probability of at least this dependence if the input had no effect.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p: Option<f64>,
+    /// Mean absolute elementary effect: change of the response over the range of the input, in standard deviations of the
+    /// response over the runs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mu_star: Option<Quantity>,
+    /// Standard deviation of the elementary effects, in the same unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<Quantity>,
+    /// False if the runs show no effect of the input: `p` is at least 0.05, or `mu_star` below a twentieth of the largest.
+    pub acts: bool,
 }
 
 impl Runs {
     pub fn of(ensemble: &EnsembleFindings) -> Self {
         Self {
+            screening: screening(ensemble),
             used: ensemble.points.rows(),
             failed: ensemble.failed.len(),
             invalid: ensemble.valid.iter().filter(|valid| !**valid).count(),
             in_prior: ensemble.in_prior,
         }
     }
+}
+
+fn screening(ensemble: &EnsembleFindings) -> ByName<ScreenedInput> {
+    let Some(found) = &ensemble.screening else { return ByName::default() };
+    let acts = found.acts();
+    let none = |acts| ScreenedInput { hsic: None, p: None, mu_star: None, sigma: None, acts };
+    let entry = |j: usize| match found {
+        Screening::Dependence(all) => {
+            ScreenedInput { hsic: Some(all[j].index.into()), p: Some(all[j].p), ..none(acts[j]) }
+        }
+        Screening::Effects(all) => ScreenedInput {
+            mu_star: Some(all[j].mean_absolute.into()),
+            sigma: Some(all[j].sd.into()),
+            ..none(acts[j])
+        },
+    };
+    ensemble.inputs.iter().enumerate().map(|(j, input)| (input.name.clone(), entry(j))).collect()
 }
 
 /// Measured data.

@@ -11,6 +11,7 @@ use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
     MeasuredFindings, Role, RunInput, SurrogateFindings,
 };
+use crate::screening::{Dependence, Screening};
 use crate::stage::screen::FlaggedCurve;
 use crate::stage::validate::{ValidationCase, ValidationFindings};
 
@@ -142,6 +143,11 @@ fn ensemble() -> EnsembleFindings {
             FailedRun { run: "run-0412".into(), reason: "`out.e` ends at step 61 of 100".into() },
         ],
         in_prior: points.iter_rows().filter(|p| p[0] < 1.5e6 && p[2] < 1.9e3).count(),
+        screening: Some(Screening::Dependence(vec![
+            Dependence { index: 0.003, p: 0.41 },
+            Dependence { index: 0.12, p: 1e-9 },
+            Dependence { index: 0.31, p: 1e-12 },
+        ])),
         points,
     }
 }

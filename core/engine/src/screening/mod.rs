@@ -1,0 +1,97 @@
+//! Screening: which inputs matter for the responses of the runs, without a surrogate.
+//!
+//! - If consecutive runs differ in one input each (a design of trajectories such as `morris`): the **elementary effects**,
+//!   their mean absolute value `mu*` and their standard deviation `sigma` (Morris, Technometrics 33 (1991) 161; Campolongo,
+//!   Cariboni and Saltelli, Environmental Modelling and Software 22 (2007) 1509).
+//! - Otherwise: the **Hilbert-Schmidt independence criterion** of each input and the response, with the p-value of a test of
+//!   independence ([`criterion`]).
+
+mod criterion;
+mod effects;
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+use lacuna_linalg::Matrix;
+
+pub use self::criterion::Dependence;
+pub use self::effects::ElementaryEffects;
+
+/// Level of the test of independence.
+pub const LEVEL: f64 = 0.05;
+/// Share of the largest mean absolute elementary effect below which an input counts as without effect.
+pub const SMALL: f64 = 0.05;
+
+/// Smallest number of runs for a test of independence.
+const LEAST_RUNS: usize = 20;
+
+/// What the runs show of the inputs, one entry per input.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Screening {
+    /// Dependence of the response on each input, from independent runs.
+    Dependence(Vec<Dependence>),
+    /// Elementary effects of each input, from trajectories.
+    Effects(Vec<ElementaryEffects>),
+}
+
+/// Screens the inputs of runs.
+///
+/// `positions` are the inputs of the runs as probabilities under their designs (`runs x inputs`), in the order in which the
+/// runs were placed. The outputs of one block of `blocks` have the same unit. `None` if there are too few runs or no
+/// response varies.
+pub fn screen(
+    positions: &Matrix,
+    responses: &Matrix,
+    blocks: impl Iterator<Item = Range<usize>>,
+) -> Option<Screening> {
+    let scaled = scaled(responses, blocks)?;
+    let effects = effects::elementary(positions, &scaled);
+    let pairs: usize = effects.iter().map(|e| e.count).sum();
+    // Trajectories have one pair per run, and as a rule a first run without one.
+    if 2 * pairs > positions.rows() {
+        return Some(Screening::Effects(effects));
+    }
+    (positions.rows() >= LEAST_RUNS)
+        .then(|| Screening::Dependence(criterion::dependences(positions, &scaled)))
+}
+
+impl Screening {
+    /// True for each input that has an effect, as far as the runs show.
+    pub fn acts(&self) -> Vec<bool> {
+        match self {
+            Self::Dependence(all) => all.iter().map(|d| d.p < LEVEL).collect(),
+            Self::Effects(all) => {
+                let largest = all.iter().map(|e| e.mean_absolute).fold(0.0, f64::max);
+                all.iter().map(|e| e.count == 0 || e.mean_absolute >= SMALL * largest).collect()
+            }
+        }
+    }
+}
+
+/// Divides the outputs of each block by its standard deviation over the runs, so that blocks of any unit count alike: the
+/// variances of the outputs of all blocks that vary add up to one. `None` if none varies.
+fn scaled(responses: &Matrix, blocks: impl Iterator<Item = Range<usize>>) -> Option<Matrix> {
+    let runs = responses.rows() as f64;
+    let mut scaled = Matrix::zeros(responses.rows(), responses.columns());
+    let mut varying = 0.0;
+    for block in blocks {
+        let mut variance = 0.0;
+        for j in block.clone() {
+            let values = responses.column(j);
+            let mean = values.iter().sum::<f64>() / runs;
+            variance += values.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / runs;
+            values.iter().enumerate().for_each(|(i, y)| scaled[(i, j)] = y - mean);
+        }
+        if !(variance > 0.0 && variance.is_finite()) {
+            continue;
+        }
+        varying += 1.0;
+        for i in 0..responses.rows() {
+            scaled.row_mut(i)[block.clone()].iter_mut().for_each(|y| *y /= variance.sqrt());
+        }
+    }
+    let size = f64::sqrt(varying);
+    scaled.as_mut_slice().iter_mut().for_each(|y| *y /= size.max(1.0));
+    (varying > 0.0).then_some(scaled)
+}
