@@ -90,9 +90,8 @@ impl Morris {
 /// Returns the root of the sum of the squared distances to other trajectories. The distance of two trajectories is the sum
 /// of the distances of their points (Campolongo et al. 2007).
 fn spread(trajectory: &Matrix, others: &[Matrix]) -> f64 {
-    let between = |a: &[f64], b: &[f64]| {
-        a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
-    };
+    let between =
+        |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt();
     let distance = |other: &Matrix| -> f64 {
         trajectory.iter_rows().map(|a| other.iter_rows().map(|b| between(a, b)).sum::<f64>()).sum()
     };

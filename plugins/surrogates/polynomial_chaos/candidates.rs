@@ -92,7 +92,10 @@ impl<'a> Candidates<'a> {
         let n = correlations.len();
         Self {
             dictionary,
-            closed: dictionary.varies().map(|open| if open { 0.0 } else { f64::INFINITY }).collect(),
+            closed: dictionary
+                .varies()
+                .map(|open| if open { 0.0 } else { f64::INFINITY })
+                .collect(),
             correlations: correlations.to_vec(),
             rates: vec![0.0; n],
             scratch: vec![0.0; n],

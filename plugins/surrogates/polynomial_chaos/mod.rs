@@ -269,9 +269,10 @@ impl PolynomialChaos {
         if fits >= max {
             return None;
         }
-        let terms = counts
-            .get(max)
-            .map_or_else(|| format!("more than {}", self.most_terms(dimension)), ToString::to_string);
+        let terms = counts.get(max).map_or_else(
+            || format!("more than {}", self.most_terms(dimension)),
+            ToString::to_string,
+        );
         Some(Fault {
             key: "degree",
             message: format!(

@@ -134,9 +134,8 @@ fn screening(study: &Study, e: &Ensemble) -> Option<Screening> {
     if designs.len() != e.points.columns() {
         return None;
     }
-    let positions = Matrix::from_fn(e.points.rows(), designs.len(), |i, j| {
-        designs[j].cdf(e.points[(i, j)])
-    });
+    let positions =
+        Matrix::from_fn(e.points.rows(), designs.len(), |i, j| designs[j].cdf(e.points[(i, j)]));
     screen(&positions, &e.responses, e.layouts.ranges())
 }
 

@@ -90,7 +90,8 @@ impl Kernel {
         let diagonal: f64 =
             (0..runs).map(|i| (self.centred[(i, i)] * other.centred[(i, i)]).powi(2)).sum();
         let squares = (all - diagonal) / (n * (n - 1.0));
-        let variance = 2.0 * (n - 4.0) * (n - 5.0) / (n * (n - 1.0) * (n - 2.0) * (n - 3.0)) * squares;
+        let variance =
+            2.0 * (n - 4.0) * (n - 5.0) / (n * (n - 1.0) * (n - 2.0) * (n - 3.0)) * squares;
         let (shape, scale) = (mean * mean / variance, variance * n / mean);
         let p = gamma_tails(shape, product / n / scale).1.exp();
         // An input or a response without variance has no dependence.

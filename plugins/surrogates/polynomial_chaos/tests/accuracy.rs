@@ -55,7 +55,11 @@ fn the_borehole_is_as_accurate_as_elsewhere() {
 #[test]
 fn every_row_of_the_table_is_reached_with_adapted_norms() {
     let q_norm = QNorm::Range(QNormRange::default());
-    let options = PolynomialChaos { q_norm: Some(q_norm), max_terms: Some(1300), ..PolynomialChaos::default() };
+    let options = PolynomialChaos {
+        q_norm: Some(q_norm),
+        max_terms: Some(1300),
+        ..PolynomialChaos::default()
+    };
     for (function, max, bounds) in [
         (CIRCUIT, 8, [3.4e-5, 2.5e-6, 1.3e-8]),
         (BOREHOLE, 6, [3.4e-5, 2.8e-5, 9.0e-7]),

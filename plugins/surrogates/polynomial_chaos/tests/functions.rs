@@ -39,8 +39,19 @@ pub fn borehole() -> Function {
 pub fn welch() -> Function {
     let value = |x: &[f64]| {
         let linear: f64 = [
-            (5, 1.0), (2, 0.05), (3, 0.08), (6, -0.03), (7, 0.03), (9, -0.09), (10, -0.01), (11, -0.07), (14, -0.04),
-            (15, 0.06), (17, -0.01), (18, -0.03), (19, -5.0),
+            (5, 1.0),
+            (2, 0.05),
+            (3, 0.08),
+            (6, -0.03),
+            (7, 0.03),
+            (9, -0.09),
+            (10, -0.01),
+            (11, -0.07),
+            (14, -0.04),
+            (15, 0.06),
+            (17, -0.01),
+            (18, -0.03),
+            (19, -5.0),
         ]
         .iter()
         .map(|&(k, c): &(usize, f64)| c * x[k - 1])
@@ -105,9 +116,8 @@ pub fn uqlab() -> Function {
 pub fn diffusion(inputs: usize) -> Function {
     const CELLS: usize = 128;
     let place = |i: usize| (i as f64 + 0.5) / CELLS as f64;
-    let covariance = Matrix::from_fn(CELLS, CELLS, |i, j| {
-        0.25 * (-(place(i) - place(j)).abs() / 0.2).exp()
-    });
+    let covariance =
+        Matrix::from_fn(CELLS, CELLS, |i, j| 0.25 * (-(place(i) - place(j)).abs() / 0.2).exp());
     let eigen = symmetric_eigen(&covariance).unwrap();
     // Largest eigenvalues first.
     let mut order: Vec<usize> = (0..CELLS).collect();

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use lacuna::data::{Layout, Parameter};
 use lacuna::math::random::{Stream, uniform};
+use lacuna::plugin::Design as _;
 use lacuna::plugin::surrogate::{Emulator, Surrogate, Training};
-use lacuna::plugin::{Design as _, Forward as _};
 use lacuna::run::{Progress, Silent};
 use lacuna_linalg::Matrix;
 
@@ -34,12 +34,12 @@ impl Case {
             })
         };
         let design = LatinHypercube::default();
-        let points =
-            placed(&design.points(runs, parameters.len(), &Stream::root(seed)).unwrap());
+        let points = placed(&design.points(runs, parameters.len(), &Stream::root(seed)).unwrap());
         let mut rng = Stream::root(99).generator();
         let fresh = placed(&Matrix::from_fn(2000, parameters.len(), |_, _| uniform(&mut rng)));
-        let values =
-            |points: &Matrix| Matrix::from_rows(1, points.iter_rows().map(|x| [(function.value)(x)]));
+        let values = |points: &Matrix| {
+            Matrix::from_rows(1, points.iter_rows().map(|x| [(function.value)(x)]))
+        };
         let (responses, truth) = (values(&points), values(&fresh));
         Self { parameters, points, responses, fresh, truth }
     }
@@ -81,9 +81,8 @@ fn a_hundred_inputs_have_products_of_two_by_default() {
     let options = PolynomialChaos::default();
     let sets = options.sets(100);
     assert!(sets.terms.len() < 40_000, "{}", sets.terms.len());
-    let most = (0..sets.terms.len())
-        .map(|t| sets.terms.term(t).iter().filter(|e| **e > 0).count())
-        .max();
+    let most =
+        (0..sets.terms.len()).map(|t| sets.terms.term(t).iter().filter(|e| **e > 0).count()).max();
     assert_eq!(most, Some(2));
     assert!(sets.sets.last().unwrap().degree >= 4);
 }
@@ -105,8 +104,7 @@ fn errors_of_many_inputs() {
         max_terms: Some(6000),
         ..PolynomialChaos::default()
     };
-    let folds =
-        PolynomialChaos { selection: Selection::KFold(10), ..PolynomialChaos::default() };
+    let folds = PolynomialChaos { selection: Selection::KFold(10), ..PolynomialChaos::default() };
     let surrogates: [(&str, Box<dyn Surrogate>); 4] = [
         ("expansion", Box::new(PolynomialChaos::default())),
         ("expansion, total degree", Box::new(plain)),

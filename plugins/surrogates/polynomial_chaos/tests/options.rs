@@ -41,8 +41,11 @@ fn options_that_cannot_work_are_named() {
         options.faults(&three, runs).iter().map(|f| f.key).collect()
     };
     assert!(keys(&PolynomialChaos::default(), Some(100)).is_empty());
-    let wrong =
-        PolynomialChaos { q_norm: Some(QNorm::Fixed(0.0)), max_interaction: Some(0), ..of_degree(0) };
+    let wrong = PolynomialChaos {
+        q_norm: Some(QNorm::Fixed(0.0)),
+        max_interaction: Some(0),
+        ..of_degree(0)
+    };
     assert_eq!(keys(&wrong, None), ["degree", "q_norm", "max_interaction"]);
     assert_eq!(keys(&PolynomialChaos { max_terms: Some(100), ..of_degree(20) }, None), ["degree"]);
     let dense = PolynomialChaos { solver: Solver::LeastSquares, ..of_degree(8) };

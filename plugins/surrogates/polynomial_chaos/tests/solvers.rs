@@ -114,7 +114,8 @@ fn norms_are_chosen_for_each_output() {
 /// Compares the sets that are tried with their definition.
 #[test]
 fn sets_of_several_norms_are_those_of_each() {
-    let options = PolynomialChaos { q_norm: Some(QNorm::List(vec![1.0, 0.5, 0.75])), ..up_to(2, 6) };
+    let options =
+        PolynomialChaos { q_norm: Some(QNorm::List(vec![1.0, 0.5, 0.75])), ..up_to(2, 6) };
     let sets = options.sets(3);
     for set in &sets.sets {
         let nested = options.nested(3, set.q_norm);

@@ -58,7 +58,9 @@ impl Runs {
 }
 
 fn screening(ensemble: &EnsembleFindings) -> ByName<ScreenedInput> {
-    let Some(found) = &ensemble.screening else { return ByName::default() };
+    let Some(found) = &ensemble.screening else {
+        return std::iter::empty().collect();
+    };
     let acts = found.acts();
     let none = |acts| ScreenedInput { hsic: None, p: None, mu_star: None, sigma: None, acts };
     let entry = |j: usize| match found {
