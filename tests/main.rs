@@ -33,6 +33,7 @@ mod refused;
 mod reliability;
 mod revisions;
 mod schema;
+mod screening;
 mod sequential;
 mod skeletons;
 mod slurm;
