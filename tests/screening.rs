@@ -60,8 +60,8 @@ fn screened(settings: &[&str]) -> (Value, String) {
     (quick::summary(&out)["runs"]["screening"].clone(), summary_text(&ran.findings))
 }
 
-/// Along trajectories a linear input has one elementary effect, `2` for `a` and `1e-3` for `d` over their ranges, in the same
-/// unknown unit; a product has scattered ones.
+/// Along trajectories a linear input has one elementary effect, `2` for `a` and `1e-3` for `d` over their ranges, in
+/// the same unknown unit; a product has scattered ones.
 #[test]
 fn trajectories_give_elementary_effects() {
     let (found, text) = screened(&[]);

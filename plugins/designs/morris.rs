@@ -9,21 +9,22 @@ use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Trajectories for elementary effects (method of Morris): from a random start one parameter after the other moves, by half
-/// of its design's probability.
+/// Trajectories for elementary effects (method of Morris): from a random start one parameter after the other moves,
+/// by half of its design's probability.
 ///
-/// Use it to find the parameters that matter among tens or hundreds, before a surrogate is thought of: a trajectory has one
-/// run more than there are parameters, and 10 trajectories are usual. With `runs` a multiple of that number all trajectories
-/// are complete. The report then lists the mean absolute effect of each parameter (`mu*`) and the standard deviation of its
-/// effects (`sigma`); no other design allows that. For a surrogate, `latin_hypercube` or `sobol` is better: here many runs
-/// share most of their coordinates.
+/// Use it to find the parameters that matter among tens or hundreds, before a surrogate is thought of: a trajectory
+/// has one run more than there are parameters, and 10 trajectories are usual. With `runs` a multiple of that number
+/// all trajectories are complete. The report then lists the mean absolute effect of each parameter (`mu*`) and the
+/// standard deviation of its effects (`sigma`); no other design allows that. For a surrogate, `latin_hypercube` or
+/// `sobol` is better: here many runs share most of their coordinates.
 ///
 /// Each parameter takes `levels` values, at the middle of slices of equal probability, so that unbounded designs are
-/// possible. Each trajectory is the one farthest from those before it among some random ones, and a longer design begins with
-/// the shorter one.
+/// possible. Each trajectory is the one farthest from those before it among some random ones, and a longer design
+/// begins with the shorter one.
 ///
-/// References: Morris, Technometrics 33 (1991) 161; Campolongo, Cariboni and Saltelli, Environmental Modelling and Software 22
-/// (2007) 1509 (`mu*` and the distance between trajectories, there with a choice among all of them at once).
+/// References: Morris, Technometrics 33 (1991) 161; Campolongo, Cariboni and Saltelli, Environmental Modelling and
+/// Software 22 (2007) 1509 (`mu*` and the distance between trajectories, there with a choice among all of them at
+/// once).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Morris {
@@ -87,8 +88,8 @@ impl Morris {
     }
 }
 
-/// Returns the root of the sum of the squared distances to other trajectories. The distance of two trajectories is the sum
-/// of the distances of their points (Campolongo et al. 2007).
+/// Returns the root of the sum of the squared distances to other trajectories. The distance of two trajectories is
+/// the sum of the distances of their points (Campolongo et al. 2007).
 fn spread(trajectory: &Matrix, others: &[Matrix]) -> f64 {
     let between =
         |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt();

@@ -81,7 +81,7 @@ pub struct EnsembleFindings {
     pub failed: Vec<FailedRun>,
     /// Number of runs inside the prior's support.
     pub in_prior: usize,
-    /// What the runs show of the inputs, one entry per input.
+    /// Effects of the inputs as far as the runs show them, one entry per input.
     pub screening: Option<Screening>,
 }
 

@@ -127,7 +127,7 @@ fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
     }
 }
 
-/// What the runs show of the inputs; `None` if there is more than one simulator behind them or too few runs.
+/// Effects of the inputs as far as the runs show them; `None` if there is more than one simulator behind them or too few runs.
 fn screening(study: &Study, e: &Ensemble) -> Option<Screening> {
     let trained = study.trained();
     let designs: Vec<&Distribution> = trained.parameters.iter().map(|p| &p.design).collect();

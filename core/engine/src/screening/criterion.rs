@@ -1,10 +1,11 @@
 //! Hilbert-Schmidt independence criterion of an input and the response.
 //!
-//! With Gaussian kernels, `K` of the input and `L` of the response among `n` runs, and the centring `H = 1 - 11'/n`, it is
-//! `tr(K H L H) / n^2`: zero in the limit if and only if they are independent. Under independence `n` times the criterion has
-//! nearly a gamma distribution, whose two moments follow from the kernels (Gretton et al., Advances in Neural Information
-//! Processing Systems 20 (2008) 585). Divided by the root of the criteria of input and response with themselves it is an
-//! index between zero and one (Da Veiga, Journal of Statistical Computation and Simulation 85 (2015) 1283).
+//! With Gaussian kernels, `K` of the input and `L` of the response among `n` runs, and the centring `H = 1 - 11'/n`,
+//! it is `tr(K H L H) / n^2`: zero in the limit if and only if they are independent. Under independence `n` times the
+//! criterion has nearly a gamma distribution, whose two moments follow from the kernels (Gretton et al., Advances in
+//! Neural Information Processing Systems 20 (2008) 585). Divided by the root of the criteria of input and response
+//! with themselves it is an index between zero and one (Da Veiga, Journal of Statistical Computation and Simulation
+//! 85 (2015) 1283).
 
 use lacuna::math::special::gamma_tails;
 use lacuna_linalg::vector::dot;
@@ -16,7 +17,8 @@ const MOST_RUNS: usize = 500;
 /// Dependence of the response on one input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dependence {
-    /// Criterion of input and response divided by the geometric mean of the criteria of each with itself, from 0 to 1.
+    /// Criterion of input and response divided by the geometric mean of the criteria of each with itself, from 0 to
+    /// 1.
     pub index: f64,
     /// Probability of at least this criterion if the response does not depend on the input.
     pub p: f64,

@@ -2,8 +2,8 @@
 
 use lacuna_linalg::Matrix;
 
-/// Elementary effects of one input: the change of the response divided by that of the input, as a change over the whole
-/// range of the input's design, in standard deviations of the response over the runs.
+/// Elementary effects of one input: the change of the response divided by that of the input, as a change over the
+/// whole range of the input's design, in standard deviations of the response over the runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElementaryEffects {
     /// Number of effects.

@@ -1,10 +1,10 @@
 //! Screening: which inputs matter for the responses of the runs, without a surrogate.
 //!
-//! - If consecutive runs differ in one input each (a design of trajectories such as `morris`): the **elementary effects**,
-//!   their mean absolute value `mu*` and their standard deviation `sigma` (Morris, Technometrics 33 (1991) 161; Campolongo,
+//! - If consecutive runs differ in one input each (a design of trajectories): the **elementary effects**, their mean
+//!   absolute value `mu*` and their standard deviation `sigma` (Morris, Technometrics 33 (1991) 161; Campolongo,
 //!   Cariboni and Saltelli, Environmental Modelling and Software 22 (2007) 1509).
-//! - Otherwise: the **Hilbert-Schmidt independence criterion** of each input and the response, with the p-value of a test of
-//!   independence ([`criterion`]).
+//! - Otherwise: the **Hilbert-Schmidt independence criterion** of each input and the response, with the p-value of a
+//!   test of independence ([`criterion`]).
 
 mod criterion;
 mod effects;
@@ -26,7 +26,7 @@ pub const SMALL: f64 = 0.05;
 /// Smallest number of runs for a test of independence.
 const LEAST_RUNS: usize = 20;
 
-/// What the runs show of the inputs, one entry per input.
+/// Effects of the inputs as far as the runs show them, one entry per input.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Screening {
     /// Dependence of the response on each input, from independent runs.
@@ -37,9 +37,9 @@ pub enum Screening {
 
 /// Screens the inputs of runs.
 ///
-/// `positions` are the inputs of the runs as probabilities under their designs (`runs x inputs`), in the order in which the
-/// runs were placed. The outputs of one block of `blocks` have the same unit. `None` if there are too few runs or no
-/// response varies.
+/// `positions` are the inputs of the runs as probabilities under their designs (`runs x inputs`), in the order in
+/// which the runs were placed. The outputs of one block of `blocks` have the same unit. `None` if there are too few
+/// runs or no response varies.
 pub fn screen(
     positions: &Matrix,
     responses: &Matrix,
@@ -69,8 +69,8 @@ impl Screening {
     }
 }
 
-/// Divides the outputs of each block by its standard deviation over the runs, so that blocks of any unit count alike: the
-/// variances of the outputs of all blocks that vary add up to one. `None` if none varies.
+/// Divides the outputs of each block by its standard deviation over the runs, so that blocks of any unit count alike:
+/// the variances of the outputs of all blocks that vary add up to one. `None` if none varies.
 fn scaled(responses: &Matrix, blocks: impl Iterator<Item = Range<usize>>) -> Option<Matrix> {
     let runs = responses.rows() as f64;
     let mut scaled = Matrix::zeros(responses.rows(), responses.columns());

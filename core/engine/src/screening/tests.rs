@@ -42,8 +42,8 @@ fn effects(points: &Matrix, responses: &Matrix) -> Vec<ElementaryEffects> {
     }
 }
 
-/// Index and p-value of three pairs of variables, computed in Python with NumPy and SciPy from the matrices `K`, `L` and `H`
-/// and the formulas of `hsicTestGamma.m` of Gretton et al. (2008).
+/// Index and p-value of three pairs of variables, computed in Python with NumPy and SciPy from the matrices `K`, `L`
+/// and `H` and the formulas of `hsicTestGamma.m` of Gretton et al. (2008).
 #[test]
 fn the_criterion_is_that_of_its_definition() {
     let x: Vec<f64> = (0..20).map(|i| (f64::from(7 * i % 20) + 0.5) / 20.0).collect();
@@ -66,7 +66,8 @@ fn the_criterion_is_that_of_its_definition() {
     }
 }
 
-/// Inputs without effect have a p-value below a level as often as the level says, within four standard errors of the count.
+/// Inputs without effect have a p-value below a level as often as the level says, within four standard errors of the
+/// count.
 #[test]
 fn independent_inputs_are_seldom_called_dependent() {
     let (sets, inputs) = (30, 10);
@@ -86,8 +87,8 @@ fn independent_inputs_are_seldom_called_dependent() {
     assert!((below as f64 - count * LEVEL).abs() < 4.0 * error, "{below} of {count}");
 }
 
-/// The function of Ishigami and Homma (1990), in which the third input has no first-order index, with two inputs that do
-/// nothing.
+/// The function of Ishigami and Homma (1990), in which the third input has no first-order index, with two inputs that
+/// do nothing.
 #[test]
 fn the_inputs_of_ishigamis_function_act() {
     let points = cube(400, 5, &Stream::root(3));
@@ -98,8 +99,9 @@ fn the_inputs_of_ishigamis_function_act() {
     assert_eq!(screened(&points, &responses).acts(), [true, true, true, false, false]);
 }
 
-/// A linear function has the elementary effect `c`, and a product `c_ij` the effect `c_ij x_j`, whose mean over the four
-/// levels is `c_ij / 2` and whose standard deviation is that of the levels. Effects are in standard deviations of the response.
+/// A linear function has the elementary effect `c`, and a product `c_ij` the effect `c_ij x_j`, whose mean over the
+/// four levels is `c_ij / 2` and whose standard deviation is that of the levels. Effects are in standard deviations
+/// of the response.
 #[test]
 fn elementary_effects_have_their_closed_form() {
     let points = trajectories(400, 3, &Stream::root(4));
@@ -119,8 +121,8 @@ fn elementary_effects_have_their_closed_form() {
     }
 }
 
-/// The function of Morris (1991): its first ten inputs act, and the others hardly do. The coefficients that the paper draws
-/// at random are those of Saltelli et al., *Global Sensitivity Analysis: The Primer* (2008).
+/// The function of Morris (1991): its first ten inputs act, and the others hardly do. The coefficients that the paper
+/// draws at random are those of Saltelli et al., *Global Sensitivity Analysis: The Primer* (2008).
 #[test]
 fn the_first_ten_inputs_of_morris_act() {
     let points = trajectories(10, 20, &Stream::root(5));

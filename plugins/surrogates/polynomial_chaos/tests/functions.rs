@@ -65,8 +65,8 @@ pub fn welch() -> Function {
     Function { name: "Welch", designs: vec![uniform(-0.5, 0.5); 20], value: Box::new(value) }
 }
 
-/// The function of Morris, Technometrics 33 (1991) 161, with the coefficients that the paper draws at random replaced as in
-/// Saltelli et al., *Global Sensitivity Analysis: The Primer* (2008): `(-1)^i` and `(-1)^(i+j)`; 20 inputs.
+/// The function of Morris, Technometrics 33 (1991) 161, with the coefficients that the paper draws at random replaced
+/// as in Saltelli et al., *Global Sensitivity Analysis: The Primer* (2008): `(-1)^i` and `(-1)^(i+j)`; 20 inputs.
 pub fn morris() -> Function {
     let value = |x: &[f64]| {
         let w: Vec<f64> = (0..20)
@@ -110,9 +110,9 @@ pub fn uqlab() -> Function {
     Function { name: "UQLab, 100 inputs", designs, value: Box::new(value) }
 }
 
-/// Diffusion in a rod with a random coefficient: `(a u')' = -1`, `u(0) = 0`, `u'(1) = 0`, and `ln a` a normal field with
-/// standard deviation 0.5 and covariance `exp(-|x - y| / 0.2)` in its Karhunen-Loève expansion (Ghanem and Spanos,
-/// *Stochastic Finite Elements*, 1991). The value is `u(1)`, the integral of `(1 - x) / a(x)`.
+/// Diffusion in a rod with a random coefficient: `(a u')' = -1`, `u(0) = 0`, `u'(1) = 0`, and `ln a` a normal field
+/// with standard deviation 0.5 and covariance `exp(-|x - y| / 0.2)` in its Karhunen-Loève expansion (Ghanem and
+/// Spanos, *Stochastic Finite Elements*, 1991). The value is `u(1)`, the integral of `(1 - x) / a(x)`.
 pub fn diffusion(inputs: usize) -> Function {
     const CELLS: usize = 128;
     let place = |i: usize| (i as f64 + 0.5) / CELLS as f64;

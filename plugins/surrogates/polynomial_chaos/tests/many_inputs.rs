@@ -65,8 +65,9 @@ impl Case {
     }
 }
 
-/// The function of Welch et al. (1992) is a short polynomial but for one quotient; the paper's kriging has a root mean square
-/// error of a tenth of the standard deviation or so with 50 runs, and a sparse basis with few products does better from 100.
+/// The function of Welch et al. (1992) is a short polynomial but for one quotient; the paper's kriging has a root
+/// mean square error of a tenth of the standard deviation or so with 50 runs, and a sparse basis with few products
+/// does better from 100.
 #[test]
 fn twenty_inputs_need_a_hundred_runs() {
     let case = Case::new(&welch(), 100, 1);
@@ -74,8 +75,8 @@ fn twenty_inputs_need_a_hundred_runs() {
     assert!(error < 2e-3, "{error}");
 }
 
-/// The default basis of 100 inputs has products: the function of UQLab's example in high dimension has five of them, and its
-/// nonlinear terms are beyond degree 1.
+/// The default basis of 100 inputs has products: the function of UQLab's example in high dimension has five of them,
+/// and its nonlinear terms are beyond degree 1.
 #[test]
 fn a_hundred_inputs_have_products_of_two_by_default() {
     let options = PolynomialChaos::default();

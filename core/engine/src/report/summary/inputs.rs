@@ -18,14 +18,14 @@ pub struct Runs {
     pub invalid: usize,
     /// Number of runs inside the support of the prior.
     pub in_prior: usize,
-    /// What the runs show of each input, without a surrogate.
+    /// Effect of each input as far as the runs show it, without a surrogate.
     #[serde(skip_serializing_if = "ByName::is_empty")]
     #[schemars(extend("propertyNames" = { "title": "input" }))]
     pub screening: ByName<ScreenedInput>,
 }
 
-/// What the runs show of an input: from runs along trajectories (the design `morris`) its elementary effects, from other
-/// runs a test of independence.
+/// Effect of an input as far as the runs show it: from runs along trajectories, each of which changes one input at a time, its
+/// elementary effects, from other runs a test of independence.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ScreenedInput {
     /// Dependence of the response on the input, from 0 to 1: the Hilbert-Schmidt independence criterion, normalised.
@@ -34,14 +34,15 @@ pub struct ScreenedInput {
     /// Probability of at least this dependence if the input had no effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub p: Option<f64>,
-    /// Mean absolute elementary effect: change of the response over the range of the input, in standard deviations of the
-    /// response over the runs.
+    /// Mean absolute elementary effect: change of the response over the range of the input, in standard deviations of
+    /// the response over the runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mu_star: Option<Quantity>,
     /// Standard deviation of the elementary effects, in the same unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<Quantity>,
-    /// False if the runs show no effect of the input: `p` is at least 0.05, or `mu_star` below a twentieth of the largest.
+    /// False if the runs show no effect of the input: `p` is at least 0.05, or `mu_star` below a twentieth of the
+    /// largest.
     pub acts: bool,
 }
 
