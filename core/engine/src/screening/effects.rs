@@ -2,6 +2,9 @@
 
 use lacuna_linalg::Matrix;
 
+/// Largest difference of two positions that are the same up to rounding errors.
+const SAME: f64 = 1e-6;
+
 /// Elementary effects of one input: the change of the response divided by that of the input, as a change over the
 /// whole range of the input's design, in standard deviations of the response over the runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,9 +34,13 @@ pub(super) fn elementary(positions: &Matrix, scaled: &Matrix) -> Vec<ElementaryE
     let none = || vec![0.0; outputs];
     let empty = Sums { count: 0, absolute: none(), plain: none(), squares: none() };
     let mut sums = vec![empty; positions.columns()];
+    // Runs of a single input differ in it in any design.
+    if varying(positions) < 2 {
+        return sums.iter().map(Sums::effects).collect();
+    }
     for i in 1..positions.rows() {
         let (before, after) = (positions.row(i - 1), positions.row(i));
-        let mut changed = (0..before.len()).filter(|&j| before[j] != after[j]);
+        let mut changed = (0..before.len()).filter(|&j| (after[j] - before[j]).abs() > SAME);
         let (Some(j), None) = (changed.next(), changed.next()) else { continue };
         let step = after[j] - before[j];
         let own = &mut sums[j];
@@ -46,6 +53,16 @@ pub(super) fn elementary(positions: &Matrix, scaled: &Matrix) -> Vec<ElementaryE
         }
     }
     sums.iter().map(Sums::effects).collect()
+}
+
+/// Returns the number of inputs that differ among the runs.
+fn varying(positions: &Matrix) -> usize {
+    let varies = |j: &usize| {
+        let mut values = positions.iter_rows().map(|row| row[*j]);
+        let first = values.next();
+        values.any(|x| Some(x) != first)
+    };
+    (0..positions.columns()).filter(varies).count()
 }
 
 impl Sums {
