@@ -75,7 +75,7 @@ pub use terms::{Basis, Nested, Sets, TermSet, Terms, Truncation};
 /// (1993) 40; Dai and Milenkovic, IEEE Transactions on Information Theory 55 (2009) 2230; Tipping and Faul, 9th
 /// Workshop on Artificial Intelligence and Statistics (2003); Lüthen, Marelli and Sudret, SIAM/ASA Journal on
 /// Uncertainty Quantification 9 (2021) 593 (a comparison).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PolynomialChaos {
     /// Family of polynomials of each parameter.
@@ -102,22 +102,6 @@ pub struct PolynomialChaos {
     /// carry this fraction of the variance, or `{ count = 20 }`. This saves time with thousands of outputs; the part
     /// that the components leave out is added to the emulator's error. Default: the outputs themselves.
     pub components: Option<Components>,
-}
-
-impl Default for PolynomialChaos {
-    fn default() -> Self {
-        Self {
-            basis: Family::default(),
-            solver: Solver::default(),
-            degree: Degree::default(),
-            q_norm: None,
-            max_interaction: None,
-            max_terms: None,
-            early_stop: EarlyStop::default(),
-            selection: Selection::default(),
-            components: None,
-        }
-    }
 }
 
 /// Highest degree that may be requested.

@@ -51,7 +51,9 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     let mut start = 0;
     for tied in order.chunk_by(|&a, &b| values[a] == values[b]) {
         let middle = start as f64 + 0.5 * tied.len() as f64;
-        tied.iter().for_each(|&i| ranks[i] = middle / values.len() as f64);
+        for &i in tied {
+            ranks[i] = middle / values.len() as f64;
+        }
         start += tied.len();
     }
     ranks

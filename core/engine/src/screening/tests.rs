@@ -42,7 +42,7 @@ fn effects(points: &Matrix, responses: &Matrix) -> Vec<ElementaryEffects> {
     }
 }
 
-/// Index and p-value of three pairs of variables, computed in Python with NumPy and SciPy from the matrices `K`, `L`
+/// Index and p-value of three pairs of variables, computed in Python with `NumPy` and `SciPy` from the matrices `K`, `L`
 /// and `H` and the formulas of `hsicTestGamma.m` of Gretton et al. (2008).
 #[test]
 fn the_criterion_is_that_of_its_definition() {
@@ -53,9 +53,9 @@ fn the_criterion_is_that_of_its_definition() {
         _ => x[i] + 0.5 * (2.0 * i as f64).cos(),
     };
     let expected = [
-        (0.381528166354867, 0.00127574990789713),
-        (0.11221596412896, 0.707629216031818),
-        (0.357851233923622, 0.00739913877599195),
+        (0.381_528_166_354_867, 0.001_275_749_907_897_13),
+        (0.112_215_964_128_96, 0.707_629_216_031_818),
+        (0.357_851_233_923_622, 0.007_399_138_775_991_95),
     ];
     for (pair, (index, p)) in expected.into_iter().enumerate() {
         let responses = Matrix::from_fn(20, 1, |i, _| y(i, pair));

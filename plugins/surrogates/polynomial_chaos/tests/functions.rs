@@ -3,11 +3,14 @@
 use lacuna::math::distribution::Distribution;
 use lacuna_linalg::{Matrix, symmetric_eigen};
 
+/// Value at a point in the units of the designs.
+type Value = Box<dyn Fn(&[f64]) -> f64>;
+
 /// A function, the designs of its inputs and its source.
 pub struct Function {
     pub name: &'static str,
     pub designs: Vec<Distribution>,
-    pub value: Box<dyn Fn(&[f64]) -> f64>,
+    pub value: Value,
 }
 
 fn uniform(low: f64, high: f64) -> Distribution {
