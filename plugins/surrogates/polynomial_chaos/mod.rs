@@ -92,7 +92,7 @@ pub struct PolynomialChaos {
     /// Maximum number of parameters in one product. Default: no limit; with more than 15 parameters 2.
     pub max_interaction: Option<usize>,
     /// Maximum number of terms of a degree; degrees with more terms are not tried. Default: 4000; with more than 15
-    /// parameters 20,000.
+    /// parameters 6000.
     pub max_terms: Option<usize>,
     /// Conditions that end the search for a better expansion.
     pub early_stop: EarlyStop,
@@ -112,7 +112,7 @@ const FEW_PARAMETERS: usize = 15;
 /// Norms for more parameters, if the study does not say.
 const NORMS_OF_MANY: [f64; 2] = [0.5, 0.75];
 /// Maximum number of terms of a degree for few and for many parameters, if the study does not say.
-const USUAL_TERMS: [usize; 2] = [4000, 20_000];
+const USUAL_TERMS: [usize; 2] = [4000, 6000];
 
 /// An error of the options in the context of the study.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -81,7 +81,7 @@ fn twenty_inputs_need_a_hundred_runs() {
 fn a_hundred_inputs_have_products_of_two_by_default() {
     let options = PolynomialChaos::default();
     let sets = options.sets(100);
-    assert!(sets.terms.len() < 40_000, "{}", sets.terms.len());
+    assert!(sets.terms.len() < 12_000, "{}", sets.terms.len());
     let most =
         (0..sets.terms.len()).map(|t| sets.terms.term(t).iter().filter(|e| **e > 0).count()).max();
     assert_eq!(most, Some(2));
