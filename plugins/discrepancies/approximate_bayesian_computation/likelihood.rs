@@ -101,7 +101,9 @@ impl Approximate {
         let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut weights: Vec<f64> = logs.iter().map(|l| (l - largest).exp()).collect();
         let sum: f64 = weights.iter().sum();
-        weights.iter_mut().for_each(|w| *w /= sum);
+        for weight in &mut weights {
+            *weight /= sum;
+        }
         let log_likelihood = largest + (sum / logs.len() as f64).ln();
         log_likelihood.is_finite().then_some(Solved {
             log_likelihood,

@@ -1,4 +1,4 @@
-//! Distances against SciPy, NumPy and POT; the likelihood and the posterior of a normal mean against their closed
+//! Distances against `SciPy`, `NumPy` and POT; the likelihood and the posterior of a normal mean against their closed
 //! forms; a sample of two modes.
 #![allow(clippy::unwrap_used)]
 
@@ -28,10 +28,10 @@ fn curve(values: &[f64]) -> Measurements {
     Measurements::new(layout, vec![Replicate::new("1", values.iter().copied().map(Some).collect())])
 }
 
-/// Values by SciPy 1.17.1 (`wasserstein_distance`, `energy_distance`, `jensenshannon` of the bins' probabilities by
-/// `norm.cdf`), by NumPy with the kernel matrices written out, and by POT 0.9.7 (`sliced_wasserstein_distance` with the
-/// same directions), for `x = sin(1.3 i) + 0.1 i` and `y = 1.4 cos(0.9 i) + 0.3` at the places `0.25 i`, `i` from 0 to
-/// 11.
+/// Values by `SciPy` 1.17.1 (`wasserstein_distance`, `energy_distance`, `jensenshannon` of the bins' probabilities by
+/// `norm.cdf`), by `NumPy` with the kernel matrices written out, and by POT 0.9.7 (`sliced_wasserstein_distance` with
+/// the same directions), for `x = sin(1.3 i) + 0.1 i` and `y = 1.4 cos(0.9 i) + 0.3` at the places `0.25 i`, `i` from 0
+/// to 11.
 #[test]
 fn the_distances_are_those_of_other_programs() {
     use Metric::{Energy, JensenShannon, MaximumMeanDiscrepancy, Wasserstein};

@@ -112,7 +112,7 @@ mod tests {
     use crate::effects::common::testing::uneven;
 
     /// Modified Bessel functions I0 to I8 at 1, which expand `exp(cos π s)` into cosines (Abramowitz and Stegun (1964),
-    /// 9.6.34; the digits from SciPy's `iv`).
+    /// 9.6.34; the digits from `SciPy`'s `iv`).
     const BESSEL: [f64; 9] = [
         1.266_065_877_752_008_4,
         0.565_159_103_992_485_1,

@@ -79,13 +79,11 @@ const SHAPES: [(&str, &str); 8] = [
 /// The prior of a shape.
 const SHAPE: Distribution = Distribution::Normal([0.0, 1.0]);
 
-impl TimeWarp {
-    /// The warp of a layout's curves, and the direction of its logarithmic rate.
-    fn map(&self, knots: &Knots<'_>, values: &[f64]) -> (Map, Direction) {
-        let direction = Direction::new(&values[1..]);
-        let coefficients: Vec<f64> = direction.along.iter().map(|s| values[0] * s).collect();
-        (Map::new(knots.at, &coefficients), direction)
-    }
+/// The warp of curves on a grid, and the direction of its logarithmic rate.
+fn warp(knots: &Knots<'_>, values: &[f64]) -> (Map, Direction) {
+    let direction = Direction::new(&values[1..]);
+    let coefficients: Vec<f64> = direction.along.iter().map(|s| values[0] * s).collect();
+    (Map::new(knots.at, &coefficients), direction)
 }
 
 /// The direction of the vector of shapes, `√2 s_k`, of which the squares of the `s_k` add to one.
@@ -142,7 +140,7 @@ impl CurveEffect for TimeWarp {
             return response.to_vec();
         }
         let knots = Knots::of(layout);
-        let (map, _) = self.map(&knots, values);
+        let (map, _) = warp(&knots, values);
         each_curve(layout, response, |y, out| {
             sampled(&knots, y, &knots.slopes(y), |i| map.to[i], |i, value, _| out[i] = value);
         })
@@ -150,7 +148,7 @@ impl CurveEffect for TimeWarp {
 
     fn slopes(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
         let knots = Knots::of(layout);
-        let (map, direction) = self.map(&knots, values);
+        let (map, direction) = warp(&knots, values);
         let slopes = each_curve(layout, response, |y, out| {
             sampled(&knots, y, &knots.slopes(y), |i| map.to[i], |i, _, slope| out[i] = slope);
         });
