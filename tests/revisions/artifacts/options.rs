@@ -1,7 +1,11 @@
 //! Options with which the plugins compute.
 
 /// Options of plugins without complete defaults, and of those whose defaults take long.
-pub const OPTIONS: [(&str, &str); 54] = [
+pub const OPTIONS: [(&str, &str); 55] = [
+    (
+        "discrepancy.approximate_bayesian_computation",
+        "metric = \"energy\"\ntolerance = { known = 0.2 }\nvariance = { half_normal = 1 }",
+    ),
     (
         "discrepancy.autoregressive",
         "variance = { half_normal = 1 }\ncorrelation_time = { known = 2 }",
