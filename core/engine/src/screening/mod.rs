@@ -4,7 +4,7 @@
 //!   absolute value `mu*` and their standard deviation `sigma` (Morris, Technometrics 33 (1991) 161; Campolongo,
 //!   Cariboni and Saltelli, Environmental Modelling and Software 22 (2007) 1509).
 //! - Otherwise: the **Hilbert-Schmidt independence criterion** of each input and the response, with the p-value of a
-//!   test of independence ([`criterion`]).
+//!   test of independence (Gretton et al., Advances in Neural Information Processing Systems 20 (2008) 585).
 
 mod criterion;
 mod effects;
