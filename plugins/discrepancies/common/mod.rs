@@ -10,6 +10,7 @@ mod normal;
 mod quantity;
 mod replicates;
 mod series;
+mod smooth;
 mod unknown;
 
 pub use biased::{Bias, Biased, normal_draw};
@@ -21,6 +22,7 @@ pub use normal::{Normal, conditional, values};
 pub use quantity::{Quantity, Variance};
 pub use replicates::{Replicates, squared};
 pub use series::Series;
+pub use smooth::{Block, Smooth, SmoothBias, loses_an_output};
 pub use unknown::{PerGroup, Unknown};
 
 #[cfg(test)]

@@ -47,7 +47,7 @@ impl Prior {
             let found = known.iter().position(|(group, _)| *group == block.group);
             let place = found.unwrap_or(known.len());
             if found.is_none() {
-                let own = self.squares_of(Self::of_group(block.group, values))?;
+                let own = self.squares_of(block.of(values))?;
                 known.push((block.group, own));
             }
             block.outputs.iter().zip(&known[place].1).for_each(|(&i, s)| squares[i] = *s);
@@ -73,8 +73,7 @@ impl Prior {
         let values = self.values(hyper)?;
         let mut bias = vec![0.0; outputs];
         for (s, block) in self.blocks.iter().enumerate() {
-            let own =
-                self.draw_series(Self::of_group(block.group, values), &stream.at(s as u64))?;
+            let own = self.draw_series(block.of(values), &stream.at(s as u64))?;
             block.outputs.iter().zip(own).for_each(|(&i, b)| bias[i] = b);
         }
         Some(bias)

@@ -20,10 +20,8 @@ use super::ConstrainedGaussianProcess;
 use super::draws::constrained_draw;
 use super::knowledge::Knowledge;
 use super::orthant::{Orthant, gradient, log_probability};
-use super::prior::{Joint, Prior, blocks};
-use crate::discrepancies::common::{
-    Dense, DenseSolved, Groups, Noise, PerGroup, Replicates, Series, Unknown, part, start,
-};
+use super::prior::{Joint, Prior};
+use crate::discrepancies::common::{Block, Dense, DenseSolved, Noise, SmoothBias, part};
 
 /// Likelihood with a constrained bias (see the module).
 pub(super) struct ConstrainedLikelihood {
@@ -55,25 +53,13 @@ impl ConstrainedLikelihood {
         known: &Known<'_>,
         shown: &Measurements,
     ) -> Result<Self, Stop> {
-        let replicates = Replicates::of(known.data, known.common)?;
-        let layout = &known.data.layout;
-        let series = Series::of(layout, options.along.as_deref()).map_err(Stop::new)?;
-        let groups = Groups::of(layout, &options.bias_by).map_err(Stop::new)?;
-        let groups = groups.with_data(&replicates.measured);
-        let mut hyper = Vec::new();
-        let unit = vec![1.0; layout.len()];
-        let name = Unknown { name: "bias", unit: layout.unit.clone() };
-        let size = |g: usize| start(&groups, &replicates, &unit, g).sqrt();
-        let sd = PerGroup::new(&options.bias, &groups, &name, size, &mut hyper);
-        let name = Unknown { name: "correlation_length", unit: series.unit.clone() };
-        let reach = series.grid.last().zip(series.grid.first()).map_or(0.0, |(b, a)| b - a);
-        let part = |_| if reach > 0.0 { 0.3 * reach } else { 1.0 };
-        let length = PerGroup::new(&options.correlation_length, &groups, &name, part, &mut hyper);
-        let noise =
-            Noise::new(known, shown, &replicates, (&options.variance, &options.by), &mut hyper)?;
+        let smooth = options.smooth();
+        let mut bias = smooth.unknowns(known, 0.3)?;
+        let noise = smooth.noise(known, shown, &mut bias)?;
+        let SmoothBias { replicates, series, groups, sd, length, hyper } = bias;
         let factor = replicates.common_factor(known.common)?;
-        let dense = Dense::new(replicates, factor, layout.len());
-        let blocks = blocks(&series, &dense.place, &groups);
+        let dense = Dense::new(replicates, factor, known.data.layout.len());
+        let blocks = Block::all(&series, &dense.place, &groups);
         let active = (0..blocks.len()).filter(|&s| !blocks[s].rows.is_empty()).collect();
         let knowledge = Knowledge::of(options, &series);
         let kernel = options.kernel;
@@ -260,7 +246,7 @@ impl ConstrainedLikelihood {
         let (mut mean, mut covariance) = (vec![0.0; size], Matrix::zeros(size, size));
         let mut cross = Matrix::zeros(size, n);
         for (s, block) in self.prior.blocks.iter().enumerate() {
-            let values = Prior::of_group(block.group, state.values);
+            let values = block.of(state.values);
             let joint = self.prior.joint(&self.prior.grid, values)?;
             let conditions = (0..m).map(|a| places + s * m + a);
             let all: Vec<usize> = block.outputs.iter().copied().chain(conditions).collect();

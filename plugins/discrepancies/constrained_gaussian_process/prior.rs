@@ -11,25 +11,10 @@
 use lacuna_linalg::{Cholesky, Matrix, multiply, multiply_transposed, multiply_vector};
 
 use super::knowledge::Knowledge;
-use crate::discrepancies::common::{Correlation, Functional, Groups, PerGroup, Series};
+use crate::discrepancies::common::{Block, Correlation, Functional, PerGroup};
 
 /// Standard deviation of the error in the conditions on sign and direction, per prior standard deviation.
 const SOFTNESS: f64 = 1e-3;
-
-/// One series of outputs with its bias.
-#[derive(Debug, Clone)]
-pub(super) struct Block {
-    /// Indices of its outputs among the measured ones.
-    pub rows: Vec<usize>,
-    /// Values of the axis at these outputs.
-    pub grid: Vec<f64>,
-    /// Flat indices of all its outputs.
-    pub outputs: Vec<usize>,
-    /// Group of its standard deviation and correlation length; `None` if the group was never measured.
-    pub group: Option<usize>,
-    /// Index of an earlier series with the same grid and group, whose prior is reused.
-    twin: Option<usize>,
-}
 
 /// Prior of the bias of all series.
 #[derive(Debug, Clone)]
@@ -53,21 +38,6 @@ pub(super) struct Joint {
     pub covariance_by_length: Matrix,
 }
 
-/// Returns the blocks of all series. `place` is the index of each output among the measured ones.
-pub(super) fn blocks(series: &Series, place: &[usize], groups: &Groups) -> Vec<Block> {
-    let mut blocks: Vec<Block> = Vec::new();
-    for outputs in &series.outputs {
-        let kept: Vec<usize> =
-            (0..outputs.len()).filter(|&j| place[outputs[j]] != usize::MAX).collect();
-        let rows: Vec<usize> = kept.iter().map(|&j| place[outputs[j]]).collect();
-        let grid: Vec<f64> = kept.iter().map(|&j| series.grid[j]).collect();
-        let group = outputs.first().and_then(|&i| groups.of[i]);
-        let twin = blocks.iter().position(|b: &Block| b.group == group && b.grid == grid);
-        blocks.push(Block { rows, grid, outputs: outputs.clone(), group, twin });
-    }
-    blocks
-}
-
 impl Prior {
     /// Returns the standard deviation and the correlation length of each group; `None` if one is not above zero.
     pub fn values<'a>(&'a self, hyper: &'a [f64]) -> Option<(&'a [f64], &'a [f64])> {
@@ -79,23 +49,13 @@ impl Prior {
         self.knowledge.positive.len()
     }
 
-    /// Returns the standard deviation and the correlation length of a series; the means of all groups for a series
-    /// never measured.
-    pub fn of_group(group: Option<usize>, (sd, length): (&[f64], &[f64])) -> (f64, f64) {
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        match group {
-            Some(g) => (sd[g], length[g]),
-            None => (mean(sd), mean(length)),
-        }
-    }
-
     /// Returns the prior of each series at its measured outputs; `None` in place of one that has an earlier twin.
     pub fn measured(&self, values: (&[f64], &[f64])) -> Option<Vec<Option<Joint>>> {
         let one = |block: &Block| {
             if block.twin.is_some() {
                 return Some(None);
             }
-            Some(Some(self.joint(&block.grid, Self::of_group(block.group, values))?))
+            Some(Some(self.joint(&block.grid, block.of(values))?))
         };
         self.blocks.iter().map(one).collect()
     }

@@ -7,22 +7,7 @@ use lacuna::run::Stop;
 use lacuna_linalg::{Cholesky, Matrix};
 
 use super::Kernel;
-use crate::discrepancies::common::{Groups, PerGroup, Replicates, Series};
-
-/// One series of outputs with its bias.
-#[derive(Debug, Clone)]
-pub(super) struct Block {
-    /// Indices of its outputs among the measured ones.
-    pub rows: Vec<usize>,
-    /// Values of the axis at these outputs.
-    pub grid: Vec<f64>,
-    /// Flat indices of all its outputs.
-    pub outputs: Vec<usize>,
-    /// Group of its standard deviation and correlation length; `None` if the group was never measured.
-    pub group: Option<usize>,
-    /// Index of an earlier series with the same grid and group, whose covariance is reused.
-    pub twin: Option<usize>,
-}
+use crate::discrepancies::common::{Block, PerGroup, Replicates};
 
 /// Bias of all series.
 #[derive(Debug, Clone)]
@@ -49,42 +34,17 @@ pub(super) fn basis(slopes: &Matrix, replicates: &Replicates) -> Result<Matrix, 
     Ok(svd.u.select_columns(&(0..rank).collect::<Vec<_>>()))
 }
 
-/// Returns the blocks of all series. `place` is the index of each output among the measured ones.
-pub(super) fn blocks(series: &Series, place: &[usize], groups: &Groups) -> Vec<Block> {
-    let mut blocks: Vec<Block> = Vec::new();
-    for outputs in &series.outputs {
-        let kept: Vec<usize> =
-            (0..outputs.len()).filter(|&j| place[outputs[j]] != usize::MAX).collect();
-        let rows: Vec<usize> = kept.iter().map(|&j| place[outputs[j]]).collect();
-        let grid: Vec<f64> = kept.iter().map(|&j| series.grid[j]).collect();
-        let group = outputs.first().and_then(|&i| groups.of[i]);
-        let twin = blocks.iter().position(|b: &Block| b.group == group && b.grid == grid);
-        blocks.push(Block { rows, grid, outputs: outputs.clone(), group, twin });
-    }
-    blocks
-}
-
 impl Bias {
     /// Returns the standard deviation and the correlation length of each group; `None` if one is not above zero.
     pub fn values<'a>(&'a self, hyper: &'a [f64]) -> Option<(&'a [f64], &'a [f64])> {
         Some((self.sd.values(hyper)?, self.length.values(hyper)?))
     }
 
-    /// Returns the standard deviation and the correlation length of a series; the means of all groups for a series
-    /// never measured.
-    pub fn of_block(block: &Block, (sd, length): (&[f64], &[f64])) -> (f64, f64) {
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        match block.group {
-            Some(g) => (sd[g], length[g]),
-            None => (mean(sd), mean(length)),
-        }
-    }
-
     /// Returns for each series the covariance at its measured outputs and its derivative with respect to the length;
     /// `None` for a series that has an earlier twin.
     pub fn covariances(&self, values: (&[f64], &[f64])) -> Vec<Option<[Matrix; 2]>> {
         let one = |block: &Block| {
-            let (sd, length) = Self::of_block(block, values);
+            let (sd, length) = block.of(values);
             block.twin.is_none().then(|| self.along(&block.grid, sd, length))
         };
         self.blocks.iter().map(one).collect()
@@ -157,7 +117,7 @@ impl Bias {
     /// Returns `H` at all outputs of each series, and the factor of `S`.
     pub fn projection(&self, values: (&[f64], &[f64])) -> Option<(Vec<Matrix>, Cholesky)> {
         let image = |grid: &[f64], block: &Block| {
-            let (sd, length) = Self::of_block(block, values);
+            let (sd, length) = block.of(values);
             lacuna_linalg::multiply(
                 &self.covariance(grid, &block.grid, sd, length),
                 &self.basis_of(block),

@@ -11,10 +11,10 @@ use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Matrix, symmetric_eigen};
 
 use super::GaussianProcess;
-use super::bias::{Bias, basis, blocks};
+use super::bias::{Bias, basis};
 use super::solve::Solved;
 use crate::discrepancies::common::{
-    Groups, Noise, PerGroup, Replicates, Series, Unknown, conditional, part, start, values,
+    Block, Noise, Replicates, SmoothBias, conditional, loses_an_output, part, values,
 };
 
 /// Likelihood with a smooth bias (see the module).
@@ -42,36 +42,21 @@ impl BiasedLikelihood {
         known: &Known<'_>,
         shown: &Measurements,
     ) -> Result<Option<Self>, Stop> {
-        let replicates = Replicates::of(known.data, known.common)?;
-        let whole = shown.summaries();
-        let lost =
-            known.data.summaries().iter().zip(&whole).any(|(a, b)| a.count == 0 && b.count > 0);
-        if options.orthogonal && lost {
+        let smooth = options.smooth();
+        let mut bias = smooth.unknowns(known, 0.1)?;
+        if options.orthogonal && loses_an_output(known.data, shown) {
             return Ok(None);
         }
-        let layout = &known.data.layout;
-        let series = Series::of(layout, options.along.as_deref()).map_err(Stop::new)?;
-        let groups = Groups::of(layout, &options.bias_by).map_err(Stop::new)?;
-        let groups = groups.with_data(&replicates.measured);
-        let mut hyper = Vec::new();
-        let unit = vec![1.0; layout.len()];
-        let name = Unknown { name: "bias", unit: layout.unit.clone() };
-        let size = |g: usize| start(&groups, &replicates, &unit, g).sqrt();
-        let sd = PerGroup::new(&options.bias, &groups, &name, size, &mut hyper);
-        let name = Unknown { name: "correlation_length", unit: series.unit.clone() };
-        let reach = series.grid.last().zip(series.grid.first()).map_or(0.0, |(b, a)| b - a);
-        let tenth = |_| if reach > 0.0 { 0.1 * reach } else { 1.0 };
-        let length = PerGroup::new(&options.correlation_length, &groups, &name, tenth, &mut hyper);
-        let noise =
-            Noise::new(known, shown, &replicates, (&options.variance, &options.by), &mut hyper)?;
+        let noise = smooth.noise(known, shown, &mut bias)?;
+        let SmoothBias { replicates, series, groups, sd, length, hyper } = bias;
         let basis = if options.orthogonal {
             basis(&(known.slopes)()?, &replicates)?
         } else {
             Matrix::zeros(replicates.measured.len(), 0)
         };
-        let mut place = vec![usize::MAX; layout.len()];
+        let mut place = vec![usize::MAX; known.data.layout.len()];
         replicates.measured.iter().enumerate().for_each(|(k, &i)| place[i] = k);
-        let blocks = blocks(&series, &place, &groups);
+        let blocks = Block::all(&series, &place, &groups);
         let kernel = options.kernel;
         let bias = Bias { kernel, blocks, grid: series.grid, basis, sd, length };
         let factor = replicates.common_factor(known.common)?;
@@ -101,7 +86,7 @@ impl BiasedLikelihood {
         let (images, inner) = self.bias.projection(values)?;
         let mut variance = vec![0.0; self.place.len()];
         for (block, image) in self.bias.blocks.iter().zip(&images) {
-            let (sd, _) = Bias::of_block(block, values);
+            let (sd, _) = block.of(values);
             for (&i, row) in block.outputs.iter().zip(image.iter_rows()) {
                 variance[i] = (sd * sd - inner.quadratic(row)).max(0.0);
             }
@@ -115,7 +100,7 @@ impl BiasedLikelihood {
         let mut bias = vec![0.0; self.place.len()];
         let mut along = vec![0.0; self.bias.basis.columns()];
         for (s, block) in self.bias.blocks.iter().enumerate() {
-            let (sd, length) = Bias::of_block(block, values);
+            let (sd, length) = block.of(values);
             let grid = &self.bias.grid;
             let eigen = symmetric_eigen(&self.bias.covariance(grid, grid, sd, length)).ok()?;
             let mut rng = stream.at(s as u64).generator();

@@ -17,7 +17,7 @@ use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::common::{By, Groups, Quantity, Series, Variance};
+use super::common::{By, Quantity, Smooth, Variance};
 use likelihood::BiasedLikelihood;
 
 pub use kernel::Kernel;
@@ -76,27 +76,22 @@ fn yes() -> bool {
     true
 }
 
+impl GaussianProcess {
+    fn smooth(&self) -> Smooth<'_> {
+        Smooth {
+            bias: &self.bias,
+            correlation_length: &self.correlation_length,
+            bias_by: &self.bias_by,
+            along: self.along.as_deref(),
+            variance: &self.variance,
+            by: &self.by,
+        }
+    }
+}
+
 impl Component for GaussianProcess {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        let layout = context.layout;
-        self.by.check("by", layout, complaints);
-        self.variance.check(Groups::of(layout, &self.by).ok().as_ref(), complaints);
-        self.bias_by.check("bias_by", layout, complaints);
-        let groups = Groups::of(layout, &self.bias_by).map_or(1, |g| g.count());
-        self.bias.check_positive("bias", groups, complaints);
-        self.correlation_length.check_positive("correlation_length", groups, complaints);
-        match Series::of(layout, self.along.as_deref()) {
-            Err(text) => {
-                complaints.at("along").say(text);
-            }
-            Ok(series) if self.bias_by.divides(&series.axis) => {
-                complaints
-                    .at("bias_by")
-                    .say("a bias applies to a whole series")
-                    .expected(format!("another axis than `{}`", series.axis));
-            }
-            Ok(_) => {}
-        }
+        self.smooth().check(context, complaints);
     }
 }
 
@@ -116,8 +111,7 @@ impl Discrepancy for GaussianProcess {
     }
 
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
-        let sd = self.variance.known_sd(layout, &self.by)?;
-        Some(StatedNoise { sd, correlation_time: None })
+        self.smooth().stated_noise(layout)
     }
 }
 

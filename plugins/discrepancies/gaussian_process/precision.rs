@@ -3,9 +3,9 @@
 use lacuna_linalg::vector::{add_scaled, dot};
 use lacuna_linalg::{Cholesky, Matrix};
 
-use super::bias::{Bias, Block};
 use super::filter::{Filter, Traces};
 use super::solve::Solved;
+use crate::discrepancies::common::Block;
 
 /// `V^-1 = A^-1 + E E' - K K'`, in the notation of [`Solved`].
 pub(super) struct Precision<'a> {
@@ -72,7 +72,7 @@ impl Precision<'_> {
         let mut found = vec![[0.0; 2]; bias.blocks.len()];
         for (s, block) in bias.blocks.iter().enumerate() {
             let Some([covariance, slope]) = bias.of(&solved.covariances, s) else { continue };
-            let (sd, _) = Bias::of_block(block, solved.values);
+            let (sd, _) = block.of(solved.values);
             let (left, right) = self.columns(block, turned.as_ref());
             let by = lacuna_linalg::multiply_transposed(&left, &right);
             // tr(A^-1 C) = tr(I - A^-1 D).

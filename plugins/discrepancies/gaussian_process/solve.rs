@@ -116,12 +116,7 @@ impl<'a> Solved<'a> {
         let mut filters = Vec::with_capacity(bias.blocks.len());
         for block in &bias.blocks {
             let own = block.rows.iter().map(|&row| noise[row]);
-            filters.push(Filter::new(
-                bias.kernel,
-                &block.grid,
-                Bias::of_block(block, values),
-                own,
-            )?);
+            filters.push(Filter::new(bias.kernel, &block.grid, block.of(values), own)?);
         }
         let mut twice: f64 = filters.iter().map(Filter::log_determinant).sum();
         let covariances = bias.covariances(values);

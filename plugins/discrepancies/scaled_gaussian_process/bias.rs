@@ -12,7 +12,7 @@ use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix, multiply};
 
 use crate::discrepancies::common::{
-    Bias, Correlation, Functional, Groups, PerGroup, Series, normal_draw,
+    Bias, Block, Correlation, Functional, Groups, PerGroup, Series, normal_draw,
 };
 
 /// Scaling parameter of each series.
@@ -21,18 +21,6 @@ pub(super) enum Scaling {
     Root,
     /// Known, or unknown with a prior.
     Stated(PerGroup),
-}
-
-/// One series of outputs.
-struct Block {
-    /// Indices of its outputs among the measured ones.
-    rows: Vec<usize>,
-    /// Values of the axis at these outputs.
-    grid: Vec<f64>,
-    /// Flat indices of all its outputs.
-    outputs: Vec<usize>,
-    /// Group of its unknowns; `None` if the group was never measured.
-    group: Option<usize>,
 }
 
 /// The scaled bias of all series (see the module).
@@ -72,31 +60,19 @@ impl ScaledBias {
         groups: &Groups,
         (sd, length, scaling): (PerGroup, PerGroup, Scaling),
     ) -> Self {
-        let block = |outputs: &Vec<usize>| {
-            let kept: Vec<usize> =
-                (0..outputs.len()).filter(|&j| place[outputs[j]] != usize::MAX).collect();
-            Block {
-                rows: kept.iter().map(|&j| place[outputs[j]]).collect(),
-                grid: kept.iter().map(|&j| series.grid[j]).collect(),
-                outputs: outputs.clone(),
-                group: outputs.first().and_then(|&i| groups.of[i]),
-            }
-        };
-        let blocks: Vec<Block> = series.outputs.iter().map(block).collect();
+        let blocks = Block::all(series, place, groups);
         let measured = place.iter().filter(|&&k| k != usize::MAX).count();
         Self { kernel, blocks, grid: series.grid.clone(), measured, sd, length, scaling }
     }
 
     /// Returns the numbers of a series; the means of all groups for one never measured.
     fn values(&self, block: &Block, hyper: &[f64]) -> Option<Values> {
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        let of = |values: &[f64]| block.group.map_or_else(|| mean(values), |g| values[g]);
         let n = block.rows.len().max(1) as f64;
         let scaling = match &self.scaling {
             Scaling::Root => 100.0 * n.sqrt(),
-            Scaling::Stated(stated) => of(stated.values(hyper)?),
+            Scaling::Stated(stated) => block.value(stated.values(hyper)?),
         };
-        let (sd, length) = (of(self.sd.values(hyper)?), of(self.length.values(hyper)?));
+        let (sd, length) = block.of((self.sd.values(hyper)?, self.length.values(hyper)?));
         Some(Values { sd, length, ratio: n / scaling })
     }
 

@@ -13,8 +13,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::common::{
-    Biased, By, Correlation, Dense, Groups, Noise, PerGroup, Quantity, Replicates, Series, Unknown,
-    Variance, start,
+    Biased, By, Correlation, Dense, PerGroup, Quantity, Smooth, SmoothBias, Unknown, Variance,
+    loses_an_output,
 };
 use bias::{ScaledBias, Scaling};
 
@@ -73,59 +73,42 @@ pub struct ScaledGaussianProcess {
 
 impl Component for ScaledGaussianProcess {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        let layout = context.layout;
-        self.by.check("by", layout, complaints);
-        self.variance.check(Groups::of(layout, &self.by).ok().as_ref(), complaints);
-        self.bias_by.check("bias_by", layout, complaints);
-        let groups = Groups::of(layout, &self.bias_by).map_or(1, |g| g.count());
-        self.bias.check_positive("bias", groups, complaints);
-        self.correlation_length.check_positive("correlation_length", groups, complaints);
+        let smooth = self.smooth().check(context, complaints);
         if let Some(scaling) = &self.scaling {
+            let groups = smooth.map_or(1, |(_, groups)| groups);
             scaling.check_positive("scaling", groups, complaints);
-        }
-        match Series::of(layout, self.along.as_deref()) {
-            Err(text) => {
-                complaints.at("along").say(text);
-            }
-            Ok(series) if self.bias_by.divides(&series.axis) => {
-                complaints
-                    .at("bias_by")
-                    .say("a bias applies to a whole series")
-                    .expected(format!("another axis than `{}`", series.axis));
-            }
-            Ok(_) => {}
         }
     }
 }
 
 impl ScaledGaussianProcess {
+    fn smooth(&self) -> Smooth<'_> {
+        Smooth {
+            bias: &self.bias,
+            correlation_length: &self.correlation_length,
+            bias_by: &self.bias_by,
+            along: self.along.as_deref(),
+            variance: &self.variance,
+            by: &self.by,
+        }
+    }
+
     /// Builds the likelihood of `known.data`, with measured variances taken from the replicates of `shown`.
     fn under(&self, known: &Known<'_>, shown: &Measurements) -> Result<Biased<ScaledBias>, Stop> {
-        let replicates = Replicates::of(known.data, known.common)?;
-        let layout = &known.data.layout;
-        let series = Series::of(layout, self.along.as_deref()).map_err(Stop::new)?;
-        let groups = Groups::of(layout, &self.bias_by).map_err(Stop::new)?;
-        let groups = groups.with_data(&replicates.measured);
-        let mut hyper = Vec::new();
-        let unit = vec![1.0; layout.len()];
-        let name = Unknown { name: "bias", unit: layout.unit.clone() };
-        let size = |g: usize| start(&groups, &replicates, &unit, g).sqrt();
-        let sd = PerGroup::new(&self.bias, &groups, &name, size, &mut hyper);
-        let name = Unknown { name: "correlation_length", unit: series.unit.clone() };
-        let reach = series.grid.last().zip(series.grid.first()).map_or(0.0, |(b, a)| b - a);
-        let tenth = |_| if reach > 0.0 { 0.1 * reach } else { 1.0 };
-        let length = PerGroup::new(&self.correlation_length, &groups, &name, tenth, &mut hyper);
+        let smooth = self.smooth();
+        let mut own = smooth.unknowns(known, 0.1)?;
         let name = Unknown { name: "scaling", unit: lacuna::data::Unit::dimensionless() };
-        let root = 100.0 * (replicates.measured.len() as f64).sqrt();
+        let root = 100.0 * (own.replicates.measured.len() as f64).sqrt();
         let scaling = match &self.scaling {
             None => Scaling::Root,
             Some(known) => {
-                Scaling::Stated(PerGroup::new(known, &groups, &name, |_| root, &mut hyper))
+                Scaling::Stated(PerGroup::new(known, &own.groups, &name, |_| root, &mut own.hyper))
             }
         };
-        let noise = Noise::new(known, shown, &replicates, (&self.variance, &self.by), &mut hyper)?;
+        let noise = smooth.noise(known, shown, &mut own)?;
+        let SmoothBias { replicates, series, groups, sd, length, hyper } = own;
         let factor = replicates.common_factor(known.common)?;
-        let dense = Dense::new(replicates, factor, layout.len());
+        let dense = Dense::new(replicates, factor, known.data.layout.len());
         let bias =
             ScaledBias::new(self.kernel, &series, &dense.place, &groups, (sd, length, scaling));
         Ok(Biased { noise, hyper, dense, bias })
@@ -143,9 +126,7 @@ impl Discrepancy for ScaledGaussianProcess {
         known: &Known<'_>,
         part: &Measurements,
     ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
-        let whole = known.data.summaries();
-        let lost = part.summaries().iter().zip(&whole).any(|(a, b)| a.count == 0 && b.count > 0);
-        if lost {
+        if loses_an_output(part, known.data) {
             return Ok(None);
         }
         let known_part = Known { data: part, ..*known };
@@ -153,8 +134,7 @@ impl Discrepancy for ScaledGaussianProcess {
     }
 
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
-        let sd = self.variance.known_sd(layout, &self.by)?;
-        Some(StatedNoise { sd, correlation_time: None })
+        self.smooth().stated_noise(layout)
     }
 }
 
