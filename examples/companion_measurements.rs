@@ -4,6 +4,7 @@
 //! The curves come from the stand-in model with that physics, on a mesh twice as fine in each direction as that of the
 //! study's simulation runs. All chosen values are written to `measurements.json`, which no study reads.
 
+mod gauges;
 mod pulses;
 
 use std::error::Error;
@@ -14,6 +15,7 @@ use lacuna::math::random::{Stream, normal};
 use lacuna_plugins::models::mercury_target::{Cells, Gas, Mercury, Sampling, Settings, Target};
 use serde_json::json;
 
+use gauges::GAUGES;
 use pulses::{Jitter, STEP, at, times};
 
 const SEED: u64 = 20_261_124;
@@ -21,19 +23,6 @@ const PULSES: u64 = 8;
 const JITTER: Jitter = Jitter { gain: [0.003, 0.003], shift: [1e-7, 1e-7] };
 /// Correlation between the noise of neighbouring values.
 const MEMORY: f64 = 0.4;
-/// Gauge and standard deviation of its noise in microstrain, as in `configs/sns`.
-const GAUGES: [(&str, f64); 10] = [
-    ("B", 16.0),
-    ("C", 26.0),
-    ("G", 7.0),
-    ("M", 6.0),
-    ("R", 14.0),
-    ("T", 15.0),
-    ("U", 28.0),
-    ("V", 13.0),
-    ("Y", 14.0),
-    ("Z", 12.0),
-];
 const MERCURY: Mercury = Mercury { density: 13_420.0, sound_speed: 1437.0, tensile_cutoff: 1.7e5 };
 const VOID_FRACTION: f64 = 1.5e-5;
 const DAMPING: f64 = 250.0;

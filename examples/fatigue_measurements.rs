@@ -6,6 +6,7 @@
 //! faulty curves. `truth.csv` has the strain of each target without noise, and of a fifth target at one and two times the
 //! energy of the pulse: what the study predicts.
 
+mod gauges;
 mod pulses;
 
 use std::error::Error;
@@ -16,6 +17,7 @@ use lacuna::math::random::{Stream, normal};
 use lacuna_plugins::models::mercury_target::{Cells, Mercury, Sampling, Settings, simulate};
 use serde_json::json;
 
+use gauges::GAUGES;
 use pulses::{Jitter, STEP, at, times};
 
 const SEED: u64 = 2_024_262_728;
@@ -27,19 +29,6 @@ const PULSES: u64 = 5;
 /// The measured targets, and a further one of which only the truth is written.
 const TARGETS: [&str; 5] = ["T24", "T26", "T27", "T28", "next"];
 const MEASURED: usize = 4;
-/// Gauge and standard deviation of its noise in microstrain.
-const GAUGES: [(&str, f64); 10] = [
-    ("B", 16.0),
-    ("C", 26.0),
-    ("G", 7.0),
-    ("M", 6.0),
-    ("R", 14.0),
-    ("T", 15.0),
-    ("U", 28.0),
-    ("V", 13.0),
-    ("Y", 14.0),
-    ("Z", 12.0),
-];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let root = Stream::root(SEED);

@@ -6,6 +6,7 @@
 //! by autocorrelated noise. All chosen values are written to `measurements.json` beside the data: the answer key, which
 //! no study reads.
 
+mod gauges;
 mod pulses;
 
 use std::error::Error;
@@ -16,6 +17,7 @@ use lacuna::math::random::{Stream, normal};
 use lacuna_plugins::models::mercury_target::{Cells, Gas, Mercury, Sampling, Settings, Target};
 use serde_json::json;
 
+use gauges::GAUGES;
 use pulses::{Jitter, STEP, at, times};
 
 const SEED: u64 = 20_240_917;
@@ -25,19 +27,6 @@ const JITTER: Jitter = Jitter { gain: [0.015, 0.015], shift: [5e-7, 5e-7] };
 const OFFSET: f64 = 2.0;
 /// Correlation between the noise of neighbouring values.
 const MEMORY: f64 = 0.4;
-/// Gauge and standard deviation of its noise in microstrain, as in `configs/sns`.
-const GAUGES: [(&str, f64); 10] = [
-    ("B", 16.0),
-    ("C", 26.0),
-    ("G", 7.0),
-    ("M", 6.0),
-    ("R", 14.0),
-    ("T", 15.0),
-    ("U", 28.0),
-    ("V", 13.0),
-    ("Y", 14.0),
-    ("Z", 12.0),
-];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mercury = Mercury { density: 13_350.0, sound_speed: 1440.0, tensile_cutoff: 1.5e5 };
