@@ -4,6 +4,7 @@
 //! `sd / √(2 n)` with the effective number of draws `n = (sd / mcse_mean)²`.
 
 mod fatigue;
+mod mixture;
 
 use std::f64::consts::{PI, SQRT_2};
 use std::fs;

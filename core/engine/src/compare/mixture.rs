@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use lacuna::run::Stop;
 use lacuna_run::{Artifact, Stage};
 use serde::Serialize;
 
@@ -16,16 +17,24 @@ pub(super) struct Predicted {
 
 impl Predicted {
     /// Reads what a run kept; `None` if the study predicts nothing.
-    pub(super) fn read(run: &Path) -> Option<Self> {
-        let kept = Quantified::load(&run.join(Stage::Quantities.folder().name())).ok()?;
-        let total = kept.about.variants.iter().position(|variant| *variant == Variant::Total)?;
+    ///
+    /// # Errors
+    /// If a file is there and cannot be read.
+    pub(super) fn read(run: &Path) -> Result<Option<Self>, Stop> {
+        let folder = run.join(Stage::Quantities.folder().name());
+        if !folder.exists() {
+            return Ok(None);
+        }
+        let kept = Quantified::load(&folder)?;
+        let total = kept.about.variants.iter().position(|variant| *variant == Variant::Total);
         let described = &kept.about.quantities;
+        let Some(total) = total.filter(|_| !described.is_empty()) else { return Ok(None) };
         let of = |(k, quantity): (usize, &Described)| {
             let row = kept.draws.row(total * described.len() + k);
             let defined = row.iter().copied().filter(|value| value.is_finite()).collect();
             (quantity.name.clone(), quantity.unit.clone(), defined)
         };
-        Some(Self { quantities: described.iter().enumerate().map(of).collect() })
+        Ok(Some(Self { quantities: described.iter().enumerate().map(of).collect() }))
     }
 
     fn draws(&self, name: &str, unit: &str) -> Option<&[f64]> {

@@ -45,7 +45,7 @@ impl Finished {
         let folder = directory.join(Stage::Evidence.folder().name());
         let left_out = known.then(|| evidence::left_out(&folder)).transpose()?;
         let curves_left_out = left_out.as_ref().and_then(|_| evidence::curves_left_out(&folder));
-        let predicted = Predicted::read(directory);
+        let predicted = Predicted::read(directory)?;
         Ok(Self { directory: directory.to_owned(), summary, left_out, curves_left_out, predicted })
     }
 

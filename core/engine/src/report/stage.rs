@@ -127,8 +127,13 @@ fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
     }
 }
 
-/// Effects of the inputs as far as the runs show them; `None` if there is more than one simulator behind them or too few runs.
+/// Effects of the inputs as far as the runs show them; `None` if there is more than one simulator behind them, if there are too
+/// few, or if some follow the data, where the inputs depend on each other.
 fn screening(study: &Study, e: &Ensemble) -> Option<Screening> {
+    let refined = study.surrogate.as_ref().is_some_and(|s| s.common.refine.is_some());
+    if refined || study.design.as_ref().is_some_and(|d| d.built.plugin.is_sequential()) {
+        return None;
+    }
     let trained = study.trained();
     let designs: Vec<&Distribution> = trained.parameters.iter().map(|p| &p.design).collect();
     if designs.len() != e.points.columns() {

@@ -19,7 +19,7 @@ pub fn part(ensemble: &EnsembleFindings, numbers: &mut Numbers) -> Markup {
         Screening::Dependence(all) => {
             let mut table = Table::new(&["input"], &["HSIC index", "p"]);
             for (name, d) in names.zip(all) {
-                table.row([name, significant(d.index, 2), significant(d.p, 2)]);
+                table.row([name, significant(d.index, 2), probability(d.p)]);
             }
             let caption = Caption::new(
                 "Dependence of the response on each input, from the runs alone: normalised Hilbert-Schmidt \
@@ -50,6 +50,13 @@ pub fn part(ensemble: &EnsembleFindings, numbers: &mut Numbers) -> Markup {
         @if let Some(sentence) = sentence(ensemble) { p { (paragraph(&sentence)) } }
         (numbers.table(&table, &caption))
     }
+}
+
+/// Smallest probability that is shown: the gamma approximation is not known to hold further out.
+const LEAST_SHOWN: f64 = 1e-6;
+
+fn probability(p: f64) -> String {
+    if p < LEAST_SHOWN { "< 10⁻⁶".to_owned() } else { significant(p, 2) }
 }
 
 /// Names the inputs of which the runs show no effect; `None` if there is none.
