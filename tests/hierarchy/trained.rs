@@ -116,6 +116,10 @@ fn targets_under_the_same_conditions_share_runs_and_emulator() {
     let (design, _) = design.split_once("id=\"measurements\"").unwrap();
     assert!(design.contains("stiffness") && !design.contains("stiffness["), "{design}");
     assert!(!design.contains("stiffness.median"), "{design}");
+    // So are their effects.
+    let screened = &summary["runs"]["screening"];
+    let acts = |input: &str| screened[input]["acts"] == true;
+    assert!(acts("stiffness") && acts("rate"), "{screened}");
     // The written study is the same study.
     let again = quick::load(&out.join("resolved.toml"), &[]);
     let names: Vec<&str> = again.parameters.iter().map(|p| p.name.as_str()).collect();

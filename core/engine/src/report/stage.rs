@@ -127,20 +127,21 @@ fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
     }
 }
 
-/// Effects of the inputs as far as the runs show them; `None` if there is more than one simulator behind them, if there are too
-/// few, or if some follow the data, where the inputs depend on each other.
+/// Effects of the inputs as far as the runs show them; `None` if there are too few runs, or if some follow the data, where the
+/// inputs depend on each other.
 fn screening(study: &Study, e: &Ensemble) -> Option<Screening> {
     let refined = study.surrogate.as_ref().is_some_and(|s| s.common.refine.is_some());
     if refined || study.design.as_ref().is_some_and(|d| d.built.plugin.is_sequential()) {
         return None;
     }
-    let trained = study.trained();
-    let designs: Vec<&Distribution> = trained.parameters.iter().map(|p| &p.design).collect();
-    if designs.len() != e.points.columns() {
-        return None;
-    }
-    let positions =
-        Matrix::from_fn(e.points.rows(), designs.len(), |i, j| designs[j].cdf(e.points[(i, j)]));
+    let designs = study.trained().parameters.iter().map(|p| &p.design);
+    let column = |input: &RunInput| input.places.first().copied();
+    let columns: Vec<usize> = inputs(study).iter().map(column).collect::<Option<_>>()?;
+    let placed: Vec<(&Distribution, usize)> = designs.zip(columns).collect();
+    let positions = Matrix::from_fn(e.points.rows(), placed.len(), |i, j| {
+        let (design, column) = placed[j];
+        design.cdf(e.points[(i, column)])
+    });
     screen(&positions, &e.responses, e.layouts.ranges())
 }
 
