@@ -70,6 +70,19 @@ fn the_posterior_from_an_ensemble_is_the_closed_form() {
     assert_eq!(again.made, Vec::<String>::new());
 }
 
+/// A surrogate that does not know the covariance of its errors cannot choose by the variance of the posterior, and says so.
+#[test]
+fn a_rule_that_the_surrogate_cannot_follow_is_replaced_aloud() {
+    let folder = line(
+        "\n[design]\nuse = \"sobol\"\nruns = 20\n\n[surrogate]\nuse = \"polynomial_chaos\"\ndegree = 1\nrefine = { runs = \
+         3, rounds = 1, choose = \"posterior_variance\" }\n",
+    );
+    let settings = ["sampler.steps=200"];
+    let ran = quick::run(&folder.path().join("study.toml"), &settings, &folder.path().join("out"));
+    let warnings = ran.unwrap_or_else(|stop| panic!("{stop}")).warnings;
+    assert!(warnings.iter().any(|said| said.contains("as by `emulator_error`")), "{warnings:?}");
+}
+
 /// An interrupted study goes on with the same points: without its last batch and everything after it, the run makes the
 /// same results as without an interruption.
 #[test]

@@ -247,7 +247,15 @@ fn next(
     };
     let points = match by_variance {
         Some(points) => points,
-        None => choose::points(&sought, &random)?,
+        None => {
+            if refine.choose == Choose::PosteriorVariance {
+                observer.warn(
+                    "the surrogate does not know the covariance of its errors, or they are negligible: the points \
+                     of this round are chosen as by `emulator_error`",
+                );
+            }
+            choose::points(&sought, &random)?
+        }
     };
     let before = learned.data.value.runs()?.runs.len();
     let more = More {
