@@ -94,11 +94,10 @@ impl BiasedLikelihood {
         Some(variance)
     }
 
-    /// Draws a bias from its prior: a process minus its projection on the derivatives with respect to the parameters.
+    /// Draws a bias from its prior.
     fn draw(&self, hyper: &[f64], stream: &Stream) -> Option<Vec<f64>> {
         let values = self.bias.values(hyper)?;
         let mut bias = vec![0.0; self.place.len()];
-        let mut along = vec![0.0; self.bias.basis.columns()];
         for (s, block) in self.bias.blocks.iter().enumerate() {
             let (sd, length) = block.of(values);
             let grid = &self.bias.grid;
@@ -108,10 +107,18 @@ impl BiasedLikelihood {
                 eigen.values.iter().map(|l| l.max(0.0).sqrt() * normal(&mut rng)).collect();
             for (&i, row) in block.outputs.iter().zip(eigen.vectors.iter_rows()) {
                 bias[i] = dot(row, &weights);
-                if self.place[i] != usize::MAX {
-                    let basis = self.bias.basis.row(self.place[i]);
-                    along.iter_mut().zip(basis).for_each(|(sum, g)| *sum += g * bias[i]);
-                }
+            }
+        }
+        self.orthogonal(values, bias)
+    }
+
+    /// Subtracts from a process its projection on the derivatives with respect to the parameters, `H S^-1 G'`.
+    fn orthogonal(&self, values: (&[f64], &[f64]), mut bias: Vec<f64>) -> Option<Vec<f64>> {
+        let mut along = vec![0.0; self.bias.basis.columns()];
+        for &i in self.bias.blocks.iter().flat_map(|block| &block.outputs) {
+            if self.place[i] != usize::MAX {
+                let basis = self.bias.basis.row(self.place[i]);
+                along.iter_mut().zip(basis).for_each(|(sum, g)| *sum += g * bias[i]);
             }
         }
         let (images, inner) = self.bias.projection(values)?;
@@ -122,6 +129,38 @@ impl BiasedLikelihood {
             }
         }
         Some(bias)
+    }
+
+    /// Makes of a draw of the bias from its prior one of the bias given the data (Matheron's rule; Journel and
+    /// Huijbregts, Mining Geostatistics (1978), VII.A): the data that it would have given, with a draw of noise and common
+    /// errors, differ from the actual ones, and what this difference says about the bias is added.
+    fn given_data(
+        &self,
+        response: &[f64],
+        hyper: &[f64],
+        bias: &[f64],
+        stream: &Stream,
+    ) -> Option<Vec<f64>> {
+        let values = self.bias.values(hyper)?;
+        let variance = self.variance(hyper)?;
+        let mut rng = stream.generator();
+        let weights: Vec<f64> = (0..self.factor.columns()).map(|_| normal(&mut rng)).collect();
+        let mut data: Vec<f64> = response.iter().zip(bias).map(|(r, b)| r + b).collect();
+        for (k, &i) in self.replicates.measured.iter().enumerate() {
+            let noise = (variance[k] / self.replicates.count[k]).sqrt() * normal(&mut rng);
+            data[i] += noise + dot(self.factor.row(k), &weights);
+        }
+        let pull = self.solve(&data, hyper, &variance)?.precision().pull;
+        let mut change = vec![0.0; bias.len()];
+        for block in &self.bias.blocks {
+            let (sd, length) = block.of(values);
+            let own: Vec<f64> = block.rows.iter().map(|&row| pull[row]).collect();
+            let covariance = self.bias.covariance(&self.bias.grid, &block.grid, sd, length);
+            let spread = lacuna_linalg::multiply_vector(&covariance, &own);
+            block.outputs.iter().zip(spread).for_each(|(&i, value)| change[i] = value);
+        }
+        let change = self.orthogonal(values, change)?;
+        Some(bias.iter().zip(change).map(|(b, c)| b + c).collect())
     }
 }
 
@@ -200,7 +239,7 @@ impl Likelihood for BiasedLikelihood {
         parts
     }
 
-    /// The bias is drawn from its prior: that of other conditions than those measured.
+    /// The bias is drawn from its prior.
     fn errors(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
         let noise = self.noise.by_output(self.noise.variance.values(hyper).unwrap_or_default());
         let noise = part("measurement", noise).independent(&stream.at(0));
@@ -208,6 +247,18 @@ impl Likelihood for BiasedLikelihood {
         let values = bias.unwrap_or_else(|| vec![f64::NAN; response.len()]);
         let own = [noise, ErrorPath { origin: "model_form".into(), values }];
         own.into_iter().chain(self.noise.setting.drawn_common_errors(stream)).collect()
+    }
+
+    fn errors_given_data(
+        &self,
+        response: &[f64],
+        hyper: &[f64],
+        stream: &Stream,
+    ) -> Option<Vec<ErrorPath>> {
+        let mut paths = self.errors(response, hyper, stream);
+        paths[1].values =
+            self.given_data(response, hyper, &paths[1].values, &stream.named("given data"))?;
+        Some(paths)
     }
 
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {

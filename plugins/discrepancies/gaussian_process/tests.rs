@@ -123,6 +123,43 @@ fn the_bias_is_orthogonal_to_what_the_parameters_do() {
     assert!(along.iter().all(|x| x.abs() < 1e-9), "{along:?}");
 }
 
+/// Given the data the bias at the measured outputs is normal with mean `C V^-1 d` and covariance `C - C V^-1 C`, with the
+/// residual `d` of the means and their covariance `V = C + D + F F'` (Rasmussen and Williams (2006), 2.23 and 2.24), also
+/// where the prior `C` is orthogonal to derivatives.
+#[test]
+fn the_bias_given_the_data_is_that_of_a_normal_vector() {
+    const COUNT: u64 = 4000;
+    let (data, error, hyper) = (rescaled(2, 3), [common(6)], [0.8, 1.5, 0.3]);
+    let response = random_matrix(1, OUTPUTS, 7).into_vec();
+    let kept: Vec<usize> = (0..OUTPUTS).filter(|&i| !data.values(i).is_empty()).collect();
+    for orthogonal in [true, false] {
+        let likelihood = build(&format!("{SHARED}\northogonal = {orthogonal}"), &data, &error);
+        let prior = likelihood.written_bias(&hyper);
+        let (n, common) = (kept.len(), shared(&error));
+        let count = |k: usize| data.values(kept[k]).len() as f64;
+        let noise = |k: usize, l: usize| if k == l { hyper[2] / count(k) } else { 0.0 };
+        let whole = |k, l| prior[(k, l)] + noise(k, l) + common(kept[k], kept[l]);
+        let whole = lacuna_linalg::Cholesky::new(&Matrix::from_fn(n, n, whole)).unwrap();
+        let known = whole.solve_matrix(&prior);
+        let mean = |k: usize| data.values(kept[k]).iter().sum::<f64>() / count(k);
+        let residual: Vec<f64> = (0..n).map(|k| mean(k) - response[kept[k]]).collect();
+        let expected = lacuna_linalg::transposed_multiply_vector(&known, &residual);
+        let left = lacuna_linalg::multiply(&prior, &known);
+        let draw = |k| likelihood.errors_given_data(&response, &hyper, &Stream::root(8).at(k));
+        let draws: Vec<Vec<f64>> = (0..COUNT).map(|k| draw(k).unwrap()[1].values.clone()).collect();
+        for (k, &i) in kept.iter().enumerate() {
+            let variance = prior[(k, k)] - left[(k, k)];
+            let found = draws.iter().map(|b| b[i]).sum::<f64>() / COUNT as f64;
+            let square =
+                draws.iter().map(|b| (b[i] - expected[k]).powi(2)).sum::<f64>() / COUNT as f64;
+            // Four and a half standard errors of a mean and of a variance over 4000 draws, for thirty outputs.
+            let n = COUNT as f64;
+            assert!((found - expected[k]).abs() < 4.5 * (variance / n).sqrt(), "{found} {k}");
+            assert!((square - variance).abs() < 4.5 * variance * (2.0 / n).sqrt(), "{square} {k}");
+        }
+    }
+}
+
 /// Matérn with index 1/2, 3/2, 5/2 at a distance of one length: Rasmussen and Williams (2006), 4.17.
 #[test]
 fn kernels_have_their_closed_forms() {

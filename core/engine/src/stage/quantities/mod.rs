@@ -2,14 +2,15 @@
 //! the place of the posterior (`forward`).
 //!
 //! At each of up to a thousand draws of the posterior the response is computed with the study's effects, and one draw of
-//! each error of the prediction is added: of the common errors, of the discrepancy's model form, of the scatter of a new
-//! replicate. The errors are curves, correlated as the discrepancy and the common errors say, because maxima, spectra and
+//! each error of the prediction is added: of the common errors given the data, of the discrepancy's model form, of the
+//! scatter of a new replicate. The errors are curves, correlated as the discrepancy and the common errors say, because maxima, spectra and
 //! cycles depend on that. Every quantity is evaluated with the errors that it includes, with none, and without each;
 //! all variants use the same draws, so that their differences are not those of random numbers.
 
 mod errors;
 mod findings;
 mod forward;
+mod given;
 mod kept;
 
 use lacuna::data::Draws;
@@ -27,7 +28,7 @@ use serde_json::{Value, json};
 use self::errors::Errors;
 pub use self::findings::{InputShare, QuantityFindings};
 pub use self::forward::{Bands, Propagated, runs};
-use super::calibrate::{Calibrated, Parts};
+use super::calibrate::Calibrated;
 use super::predictions::Chosen;
 use super::{predict, stream};
 use crate::stage::inverse_problem::InverseProblem;
@@ -118,8 +119,7 @@ pub fn stage(
         asked_for(study),
     ]);
     predicted(study, &inputs, run, observer, |progress| {
-        let parts = Parts::predicting(study, measured, problem)?;
-        let errors = Errors::of(study, measured, problem, parts.likelihood())?;
+        let errors = Errors::of(study, measured, problem, &calibrated.value.outcome.map)?;
         let chosen = Chosen::of(&calibrated.value, measured.likelihood.count());
         let forward = Some(problem.forward());
         let basis = Basis::of(&calibrated.value, &chosen);
@@ -211,7 +211,7 @@ const TOGETHER: usize = 40;
 struct Work<'a> {
     study: &'a Study,
     forward: Option<&'a dyn Forward>,
-    errors: Errors<'a>,
+    errors: Errors,
     asked: Vec<Asked>,
     derived: Vec<Derived>,
     random: Stream,
@@ -246,7 +246,7 @@ impl<'a> Work<'a> {
     fn new(
         study: &'a Study,
         forward: Option<&'a dyn Forward>,
-        errors: Errors<'a>,
+        errors: Errors,
         progress: &'a Progress<'a>,
     ) -> Self {
         let (asked, derived) = (study.asked(), study.derived());
