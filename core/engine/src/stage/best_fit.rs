@@ -12,6 +12,17 @@ use super::stream;
 use crate::posterior::{OfData, Posterior};
 use crate::study::Study;
 
+/// A best fit to data.
+#[derive(Clone, Copy)]
+pub struct Fit<'a> {
+    /// Data.
+    pub data: &'a Observations,
+    /// Forward map.
+    pub forward: &'a dyn Forward,
+    /// Parameters of the best fit.
+    pub point: &'a [f64],
+}
+
 /// Parameters that maximise prior times `|y - m|^-N`: the normal likelihood of independent data with its unknown
 /// variance integrated out under the prior `1 / variance`.
 pub fn point(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Vec<f64>, Stop> {

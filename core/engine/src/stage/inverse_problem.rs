@@ -6,8 +6,10 @@ use lacuna::data::Observations;
 use lacuna::math::random::Stream;
 use lacuna::plugin::{Emulator, Forward};
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 use lacuna_run::Kept;
 
+use super::best_fit::{self, Fit};
 use super::common_error::Allowance;
 use super::direct::Direct;
 use super::emulated::Emulated;
@@ -38,12 +40,14 @@ pub struct InverseProblem<'a> {
     pub trial: Option<Trial>,
     /// Errors of emulator and numerics for these data, computed on first use.
     allowances: OnceLock<Vec<Allowance>>,
+    /// Least-squares best fit to these data, computed on first use.
+    best_fit: OnceLock<Vec<f64>>,
 }
 
 impl<'a> InverseProblem<'a> {
     /// Combines data and a forward map; `trial` is set if the data were generated.
     pub fn new(data: &'a Kept<Data>, route: Route<'a>, trial: Option<Trial>) -> Self {
-        Self { data, route, trial, allowances: OnceLock::new() }
+        Self { data, route, trial, allowances: OnceLock::new(), best_fit: OnceLock::new() }
     }
 
     /// The forward map: the emulator, including the predicted numerical error, or the model itself.
@@ -95,6 +99,26 @@ impl<'a> InverseProblem<'a> {
         self.emulated()?.refinement.as_ref()
     }
 
+    /// Least-squares best fit to these data.
+    fn best_fit(&self, study: &Study, data: &Observations) -> Result<&[f64], Stop> {
+        if let Some(found) = self.best_fit.get() {
+            return Ok(found);
+        }
+        let found = best_fit::point(study, data, self.forward())?;
+        Ok(self.best_fit.get_or_init(|| found))
+    }
+
+    /// Response at the least-squares best fit to these data.
+    pub(super) fn fitted_response(
+        &self,
+        study: &Study,
+        data: &Observations,
+    ) -> Result<Vec<f64>, Stop> {
+        let best = self.best_fit(study, data)?;
+        let point = Matrix::from_vec(1, best.len(), best.to_vec());
+        Ok(self.forward().mean(&point).into_vec())
+    }
+
     /// Errors of emulator and numerics that the study's likelihood includes, for these data.
     pub(super) fn allowances(
         &self,
@@ -105,12 +129,22 @@ impl<'a> InverseProblem<'a> {
         if let Some(found) = self.allowances.get() {
             return Ok(found);
         }
-        let mut found = Vec::new();
+        let (mut found, forward) = (Vec::new(), self.forward());
         if let (Some(fitted), true) = (self.fitted(), keys.emulator_error) {
-            found.push(emulator_error::allowance(study, &fitted.value, data, self.forward())?);
+            let best = self.best_fit(study, data)?;
+            found.push(emulator_error::allowance(
+                study,
+                &fitted.value,
+                Fit { data, forward, point: best },
+            )?);
         }
         if let (Some(kept), Some(section)) = (self.numerics(), &study.numerical_error) {
-            found.push(kept.value.allowance(study, &section.written, data, self.forward())?);
+            let best = self.best_fit(study, data)?;
+            found.push(kept.value.allowance(
+                study,
+                &section.written,
+                Fit { data, forward, point: best },
+            )?);
         }
         Ok(self.allowances.get_or_init(|| found))
     }

@@ -29,6 +29,7 @@ pub mod quantities;
 pub mod read;
 pub mod refine;
 pub mod reliability;
+mod replicate_error;
 pub mod results;
 pub mod sampling;
 pub mod screen;

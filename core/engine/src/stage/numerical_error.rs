@@ -7,12 +7,12 @@
 
 use std::path::Path;
 
-use lacuna::data::{Ensemble, Observations, Parameter};
+use lacuna::data::{Ensemble, Parameter};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::moments;
 use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin};
 use lacuna::plugin::surrogate::FitError;
-use lacuna::plugin::{Emulator, Fact, Forward};
+use lacuna::plugin::{Emulator, Fact};
 use lacuna::run::{Observer, Progress, Stop, files};
 use lacuna_linalg::Matrix;
 use lacuna_run::arrays::{self, Array};
@@ -20,6 +20,7 @@ use lacuna_run::{Artifact, Folder, Kept, RunDirectory, Stage};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use super::best_fit::Fit;
 use super::common_error::Allowance;
 use super::emulator_error::{self, Curves};
 use super::fidelity::{Combined, Coverage, Difference, Lesson, Rule, Source, Verdict, cover};
@@ -98,12 +99,11 @@ impl NumericalError {
         &self,
         study: &Study,
         section: &NumericalErrorSection,
-        data: &Observations,
-        forward: &dyn Forward,
+        fit: Fit<'_>,
     ) -> Result<Allowance, Stop> {
         let (errors, beyond) = self.unknown(section);
         let curves = Curves { points: self.points.clone(), errors, stated: None };
-        let factors = emulator_error::factors(study, &curves, data, forward)?;
+        let factors = emulator_error::factors(study, &curves, fit)?;
         let beyond = over_root(&beyond);
         Ok(Allowance::new(ErrorOrigin::Numerics, factors.map(|own| joined(&own, &beyond))))
     }

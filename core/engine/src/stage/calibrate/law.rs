@@ -13,7 +13,7 @@ use lacuna_linalg::Matrix;
 use crate::stage::common_error::Allowance;
 use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::read::Measured;
-use crate::stage::{best_fit, common_error};
+use crate::stage::{best_fit, replicate_error};
 use crate::study::Study;
 
 /// Discrepancy and common errors of a study; see the module.
@@ -25,6 +25,8 @@ pub struct Law<'a> {
     forward: &'a dyn Forward,
     plugin: &'a dyn Discrepancy,
     common: Vec<CommonError>,
+    /// Response at the best fit, if the study includes the error of the replicates.
+    fitted: Vec<f64>,
     slopes: OnceLock<Result<Matrix, Stop>>,
 }
 
@@ -58,9 +60,14 @@ impl<'a> Law<'a> {
         let errors = problem.allowances(study, &section.common, &measured.likelihood)?;
         let common = errors.iter().map(|error| size(error).clone()).collect();
         let replicates = section.common.replicate_error.then_some(&measured.used);
+        let fitted = match replicates {
+            Some(_) => problem.fitted_response(study, &measured.likelihood)?,
+            None => Vec::new(),
+        };
         Ok(Self {
             replicates,
             common,
+            fitted,
             ..Self::bare(study, &measured.likelihood, problem.forward())?
         })
     }
@@ -80,6 +87,7 @@ impl<'a> Law<'a> {
             forward,
             plugin: &*section.built.plugin,
             common: Vec::new(),
+            fitted: Vec::new(),
             slopes: OnceLock::new(),
         })
     }
@@ -119,7 +127,8 @@ impl<'a> Law<'a> {
         // A stated covariance already contains the correlation within a replicate.
         let shared = |replicates: &&Observations| replicates.blocks[i].covariance.is_none();
         if let Some(replicates) = self.replicates.filter(shared) {
-            let of_replicates = common_error::of_replicates(&replicates.blocks[i]);
+            let fitted = &self.fitted[range.clone()];
+            let of_replicates = replicate_error::of_replicates(&replicates.blocks[i], fitted);
             let after = usize::from(own.first().is_some_and(|e| e.origin == ErrorOrigin::Emulator));
             own.splice(after..after, of_replicates);
         }

@@ -22,13 +22,11 @@ mod taper;
 #[cfg(test)]
 mod tests;
 
-use lacuna::data::Observations;
-use lacuna::plugin::Forward;
 use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin};
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
-use super::best_fit;
+use super::best_fit::{self, Fit};
 use super::common_error::Allowance;
 use super::surrogate::Fitted;
 use crate::study::Study;
@@ -40,14 +38,9 @@ use taper::Places;
 pub use curves::{Curves, Runs, rows_near_prior};
 
 /// The error of a fitted emulator, for these data.
-pub fn allowance(
-    study: &Study,
-    fitted: &Fitted,
-    data: &Observations,
-    forward: &dyn Forward,
-) -> Result<Allowance, Stop> {
+pub fn allowance(study: &Study, fitted: &Fitted, fit: Fit<'_>) -> Result<Allowance, Stop> {
     let curves = fitted.curves.near_prior(study);
-    Ok(Allowance::new(ErrorOrigin::Emulator, factors(study, &curves, data, forward)?))
+    Ok(Allowance::new(ErrorOrigin::Emulator, factors(study, &curves, fit)?))
 }
 
 /// The error of a fitted emulator with its mean size over the prior, where there are no data.
@@ -59,15 +52,10 @@ pub fn over_prior(study: &Study, fitted: &Fitted) -> Result<CommonError, Stop> {
 
 /// Covariance of an error of which some curves are known, as two factors of low rank, `outputs x rank`: one enlarged by
 /// the factor required for estimates, and one with the size of the curves.
-pub fn factors(
-    study: &Study,
-    curves: &Curves,
-    data: &Observations,
-    forward: &dyn Forward,
-) -> Result<[Matrix; 2], Stop> {
-    let best = best_fit::point(study, data, forward)?;
+pub fn factors(study: &Study, curves: &Curves, fit: Fit<'_>) -> Result<[Matrix; 2], Stop> {
+    let Fit { data, forward, point: best } = fit;
     let size = Size::learned(curves);
-    let noise = noise::of_mean(study, data, forward, &best, &curves.errors)?;
+    let noise = noise::of_mean(study, data, forward, best, &curves.errors)?;
     let places = Places::of(&study.layouts);
     let shapes = size.without(&curves.errors);
     let shifts = Shifts::of(curves, &shapes, &size, &places, &noise);
@@ -75,8 +63,8 @@ pub fn factors(
     let factor = shifts.factor(&slopes);
     let there = if size.varies() {
         let even = shifts.covariance(&curves.errors);
-        let slopes = slopes(&best);
-        Pilot { study, forward, best: &best, slopes: &slopes }.size(&shifts, &even, &size)
+        let slopes = slopes(best);
+        Pilot { study, forward, best, slopes: &slopes }.size(&shifts, &even, &size)
     } else {
         1.0
     };
