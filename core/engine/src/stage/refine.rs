@@ -245,17 +245,16 @@ fn next(
         Choose::PosteriorVariance => variance::points(&sought, noise, &random)?,
         Choose::EmulatorError => None,
     };
-    let points = match by_variance {
-        Some(points) => points,
-        None => {
-            if refine.choose == Choose::PosteriorVariance {
-                observer.warn(
-                    "the surrogate does not know the covariance of its errors, or they are negligible: the points \
-                     of this round are chosen as by `emulator_error`",
-                );
-            }
-            choose::points(&sought, &random)?
+    let points = if let Some(points) = by_variance {
+        points
+    } else {
+        if refine.choose == Choose::PosteriorVariance {
+            observer.warn(
+                "the surrogate does not know the covariance of its errors, or they are negligible: the points of \
+                 this round are chosen as by `emulator_error`",
+            );
         }
+        choose::points(&sought, &random)?
     };
     let before = learned.data.value.runs()?.runs.len();
     let more = More {

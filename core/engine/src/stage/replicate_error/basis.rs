@@ -67,7 +67,7 @@ fn independent(functions: [Vec<f64>; KINDS]) -> [Option<Vec<f64>>; KINDS] {
             add_scaled(&mut left, -along, direction);
         }
         let square = dot(&left, &left);
-        if !(square > OWN * size) {
+        if square <= OWN * size {
             return None;
         }
         known.push(left.iter().map(|x| x / square.sqrt()).collect());

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! because deviations are from the mean of `R_k` replicates. It is solved for `v` with the weights of the solution before
-//! (DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177; Paule and Mandel, J. Res. NBS 87 (1982) 377). The
+//! (`DerSimonian` and Laird, Controlled Clinical Trials 7 (1986) 177; Paule and Mandel, J. Res. NBS 87 (1982) 377). The
 //! variance of `c` is what the means of the replicates have beyond that. A variance known from few replicates is first enlarged
 //! by the square of Student's 97.5 % quantile over the normal one, so that a 95 % interval that it dominates has its level.
 
