@@ -247,7 +247,7 @@ fn the_table_of_the_guide() {
     const SETS: u64 = 200;
     let truth = target("T24");
     let (slow, fast) = (target("T26"), target("T28"));
-    let speed = |i: usize| (fast[i] - slow[i]) / (1853.296_13 - 1842.163_60);
+    let speed = |i: usize| (fast[i] - slow[i]) / (1_853.296_13 - 1_842.163_60);
     for unknowns in [1, 2] {
         let slope = |i: usize, j: usize| if j == 0 { speed(i) } else { truth[i] };
         let slopes = Matrix::from_fn(truth.len(), unknowns, slope);
