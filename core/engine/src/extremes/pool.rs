@@ -1,0 +1,57 @@
+//! Points of a search, each evaluated once.
+
+use lacuna_linalg::Matrix;
+
+use super::Towards;
+
+/// Evaluated points.
+pub(super) struct Pool<'a> {
+    evaluate: &'a (dyn Fn(&Matrix) -> Matrix + Sync),
+    most: usize,
+    /// The points.
+    pub points: Vec<Vec<f64>>,
+    /// Values of all functions at them.
+    pub values: Vec<Vec<f64>>,
+    /// True if more points were wanted than there may be.
+    pub exhausted: bool,
+}
+
+impl<'a> Pool<'a> {
+    /// An empty pool for at most `most` points.
+    pub fn new(evaluate: &'a (dyn Fn(&Matrix) -> Matrix + Sync), most: usize) -> Self {
+        Self { evaluate, most, points: Vec::new(), values: Vec::new(), exhausted: false }
+    }
+
+    /// Rows of points, which are evaluated together where they are new; `None` if the pool has no room for them.
+    pub fn at(&mut self, points: &[Vec<f64>]) -> Option<Vec<usize>> {
+        let mut new: Vec<&Vec<f64>> = Vec::new();
+        for point in points {
+            if !self.points.contains(point) && !new.contains(&point) {
+                new.push(point);
+            }
+        }
+        if self.points.len() + new.len() > self.most {
+            self.exhausted = true;
+            return None;
+        }
+        if let Some(first) = new.first() {
+            let values = (self.evaluate)(&Matrix::from_rows(first.len(), new.iter().copied()));
+            self.values.extend(values.iter_rows().map(<[f64]>::to_vec));
+            self.points.extend(new.into_iter().cloned());
+        }
+        points.iter().map(|point| self.points.iter().position(|other| other == point)).collect()
+    }
+
+    /// Row and value of the best point of a function, the first of equals; `None` if it is defined nowhere.
+    pub fn best(&self, function: usize, towards: Towards) -> Option<(usize, f64)> {
+        let mut best: Option<(usize, f64)> = None;
+        for (row, values) in self.values.iter().enumerate() {
+            let value = values[function];
+            let better = |(_, known): (usize, f64)| towards.signed(value) > towards.signed(known);
+            if value.is_finite() && best.is_none_or(better) {
+                best = Some((row, value));
+            }
+        }
+        best
+    }
+}
