@@ -48,6 +48,16 @@ impl<'a> Errors<'a> {
         Self { likelihood: None, common: Vec::new() }
     }
 
+    /// Returns true if there are no errors.
+    pub fn is_none(&self) -> bool {
+        self.likelihood.is_none() && self.common.is_empty()
+    }
+
+    /// Number of errors of emulator and numerics.
+    pub fn count(&self) -> usize {
+        self.common.len()
+    }
+
     /// One draw of all errors around the response at a point of the posterior.
     pub fn draw(&self, response: &[f64], point: &[f64], stream: &Stream) -> Vec<ErrorPath> {
         let of_discrepancy = |likelihood: &dyn Likelihood| {

@@ -7,9 +7,11 @@
 //! cycles depend on that. Every quantity is evaluated with the errors that it includes, with none, and without each;
 //! all variants use the same draws, so that their differences are not those of random numbers.
 
+mod bounds;
 mod errors;
 mod findings;
 mod forward;
+mod inputs;
 mod kept;
 
 use lacuna::data::Draws;
@@ -25,6 +27,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use self::errors::Errors;
+pub use self::bounds::{Bounds, BoundsFindings, End, Interval, PROBABILITIES, Range};
 pub use self::findings::{InputShare, QuantityFindings};
 pub use self::forward::{Bands, Propagated, runs};
 use super::calibrate::{Calibrated, Parts};
@@ -139,11 +142,18 @@ fn of_priors(
         problem.origin(),
         problem.numerics().map(|n| &n.hash),
         study.numerical_error.as_ref().map(|section| section.written.scales()),
-        forward::priors(study),
+        inputs::priors(study),
         study.effects_identity(),
         draws,
         asked_for(study),
     ]);
+    let intervals = study.intervals();
+    let inputs = if intervals.is_empty() {
+        inputs
+    } else {
+        let size = study.interval_search();
+        json!([inputs, intervals, size.points, size.draws])
+    };
     predicted(study, &inputs, run, observer, |progress| {
         if let Some(text) = forward::announcement(study, problem) {
             observer.remark(&text);
@@ -199,10 +209,43 @@ fn predicted(
             found.name, found.undefined, found.draws
         ));
     }
+    warn_of_bounds(&kept.value, observer);
     let count = findings.len();
     let word = if count == 1 { "quantity" } else { "quantities" };
     observer.end(Stage::Quantities.label(), &format!("{count} {word}"));
     Ok(Some(kept))
+}
+
+/// Warns of bounds that the search may have missed, and of those of quantities that are undefined at some draws.
+fn warn_of_bounds(quantified: &Quantified, observer: &dyn Observer) {
+    let Some(found) = quantified.propagated.as_ref().and_then(|all| all.bounds.as_ref()) else {
+        return;
+    };
+    for (about, bounds) in quantified.about.quantities.iter().zip(&found.quantities) {
+        let name = &about.name;
+        let Some(bounds) = bounds else {
+            observer.warn(&format!("the quantity `{name}` is undefined everywhere in the intervals"));
+            continue;
+        };
+        let named = bounds.named();
+        let doubtful: Vec<&str> =
+            named.iter().filter(|(_, range)| !range.is_agreed()).map(|(name, _)| *name).collect();
+        if !doubtful.is_empty() {
+            observer.warn(&format!(
+                "two independent searches over the intervals found different bounds of `{name}` ({}); true bounds may lie \
+                 farther apart. Raise `forward.intervals.points`, now {}",
+                doubtful.join(", "),
+                found.points
+            ));
+        }
+        if bounds.undefined > 0 {
+            observer.warn(&format!(
+                "the quantity `{name}` is undefined at up to {} of {} draws in the intervals; its bounds are those of the \
+                 others",
+                bounds.undefined, found.draws
+            ));
+        }
+    }
 }
 
 /// Number of draws processed together.
