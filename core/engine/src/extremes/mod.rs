@@ -104,8 +104,7 @@ pub fn extremes(
     let each = plan.points.saturating_sub(shared.len()) / 2;
     let mut common = Pool::new(evaluate, shared.len());
     common.at(&shared);
-    let halves: Vec<Pool<'_>> =
-        (0..2).map(|k| half(plan, each, &stream.at(k), evaluate)).collect();
+    let halves: Vec<Pool<'_>> = (0..2).map(|k| half(plan, each, &stream.at(k), evaluate)).collect();
     collect(common, halves)
 }
 
@@ -173,9 +172,8 @@ fn collect(common: Pool<'_>, halves: Vec<Pool<'_>>) -> Extremes {
         let worst = values.map(|value| value.map_or(f64::NEG_INFINITY, |v| to.signed(v)));
         worst.fold(f64::INFINITY, f64::min)
     };
-    let worse: Vec<[f64; 2]> = (0..functions)
-        .map(|function| Towards::BOTH.map(|to| of_halves(function, to)))
-        .collect();
+    let worse: Vec<[f64; 2]> =
+        (0..functions).map(|function| Towards::BOTH.map(|to| of_halves(function, to))).collect();
     let mut all = common;
     for half in halves {
         all.points.extend(half.points);

@@ -55,7 +55,8 @@ fn stencil(point: &[f64]) -> Vec<Vec<f64>> {
 
 /// Slope between the neighbours of a point, of which one may be undefined; zero if both are.
 fn slope([below, here, above]: [(f64, f64); 3]) -> f64 {
-    let between = |(a, f): (f64, f64), (b, g): (f64, f64)| if b > a { (g - f) / (b - a) } else { 0.0 };
+    let between =
+        |(a, f): (f64, f64), (b, g): (f64, f64)| if b > a { (g - f) / (b - a) } else { 0.0 };
     match (below.1.is_finite(), above.1.is_finite()) {
         (true, true) => between(below, above),
         (true, false) => between(below, here),

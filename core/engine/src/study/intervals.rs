@@ -60,9 +60,7 @@ impl Study {
         let affordable = if emulated || !self.has_distributions() { thorough } else { 60 + 20 * k };
         SearchSize {
             points: section.and_then(|own| own.points).unwrap_or(affordable),
-            draws: section
-                .and_then(|own| own.draws)
-                .unwrap_or(if emulated { 1000 } else { 200 }),
+            draws: section.and_then(|own| own.draws).unwrap_or(if emulated { 1000 } else { 200 }),
         }
     }
 }
@@ -92,7 +90,9 @@ pub(super) fn check(study: &Study, root: &Node, complaints: &mut Complaints<'_>)
         for name in names {
             complaints
                 .at(&format!("parameter.{name}.prior"))
-                .say(format!("{needs} needs a distribution of `{name}`, which an interval does not state"))
+                .say(format!(
+                    "{needs} needs a distribution of `{name}`, which an interval does not state"
+                ))
                 .expected(format!("a distribution such as `uniform`, or a study without {needs}"));
         }
         return;

@@ -30,7 +30,13 @@ pub struct Unknown {
 impl Unknown {
     /// An unknown that all scenarios share.
     pub fn shared(name: &str) -> Self {
-        Self { name: name.to_owned(), scenario: None, member: None, of_population: false, interval: false }
+        Self {
+            name: name.to_owned(),
+            scenario: None,
+            member: None,
+            of_population: false,
+            interval: false,
+        }
     }
 
     /// Returns true if it acts in a scenario.

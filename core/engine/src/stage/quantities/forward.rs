@@ -64,7 +64,7 @@ pub fn runs(study: &Study) -> Option<usize> {
     Some(each.saturating_mul(study.scenarios.len().max(1)))
 }
 
-/// Propagates the priors.
+/// Propagates the priors, and bounds the quantities over the intervals.
 pub(super) fn propagate(
     study: &Study,
     problem: &InverseProblem<'_>,

@@ -26,8 +26,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use self::errors::Errors;
 pub use self::bounds::{Bounds, BoundsFindings, End, Interval, PROBABILITIES, Range};
+use self::errors::Errors;
 pub use self::findings::{InputShare, QuantityFindings};
 pub use self::forward::{Bands, Propagated, runs};
 use super::calibrate::{Calibrated, Parts};
@@ -224,7 +224,8 @@ fn warn_of_bounds(quantified: &Quantified, observer: &dyn Observer) {
     for (about, bounds) in quantified.about.quantities.iter().zip(&found.quantities) {
         let name = &about.name;
         let Some(bounds) = bounds else {
-            observer.warn(&format!("the quantity `{name}` is undefined everywhere in the intervals"));
+            observer
+                .warn(&format!("the quantity `{name}` is undefined everywhere in the intervals"));
             continue;
         };
         let named = bounds.named();

@@ -56,7 +56,7 @@ pub struct Bounds {
     pub q975: Range,
     /// Lower and upper bound of the quantile at each of [`PROBABILITIES`].
     pub quantiles: Vec<[f64; 2]>,
-    /// Largest number of draws at which the quantity is undefined, over all points of the box.
+    /// Largest number of draws at which the quantity is undefined, over the points with all draws.
     pub undefined: usize,
 }
 

@@ -78,7 +78,8 @@ pub(in super::super) fn bounds(
         (found.points.clone(), found.values.clone())
     };
     let places: Vec<Vec<f64>> = points.iter().map(|u| natural(u)).collect();
-    let of = |quantity: usize| Ends { found: &found, places: &places, rows: &rows }.bounds(quantity);
+    let of =
+        |quantity: usize| Ends { found: &found, places: &places, rows: &rows }.bounds(quantity);
     Some(BoundsFindings {
         draws,
         searched_draws,
@@ -93,7 +94,11 @@ fn intervals(study: &Study) -> Vec<Interval> {
     let interval = |j: usize| {
         let parameter = &study.parameters[j];
         let (low, high) = parameter.prior.support();
-        Interval { name: parameter.name.clone(), unit: parameter.unit.to_string(), ends: [low, high] }
+        Interval {
+            name: parameter.name.clone(),
+            unit: parameter.unit.to_string(),
+            ends: [low, high],
+        }
     };
     study.intervals().into_iter().map(interval).collect()
 }
@@ -161,9 +166,8 @@ fn chosen(found: &Extremes, quantities: usize) -> Vec<Vec<f64>> {
             points.push(found.points[row].clone());
         }
     }
-    let of_quantiles = (0..PROBABILITIES.len()).flat_map(|k| {
-        (0..quantities).flat_map(move |q| rows(q * COUNT + QUANTILES + k))
-    });
+    let of_quantiles = (0..PROBABILITIES.len())
+        .flat_map(|k| (0..quantities).flat_map(move |q| rows(q * COUNT + QUANTILES + k)));
     for row in of_quantiles {
         let far = |other: &Vec<f64>| {
             other.iter().zip(&found.points[row]).any(|(a, b)| (a - b).abs() > NEAR)
