@@ -109,8 +109,8 @@ fn a_shift_by_an_interval() {
             assert!(off.abs() < 1.5 * ERRORS * error, "{key} {p}: {off} {error}");
         }
     }
-    // 80 points with 200 draws, 16 with all 1000, 2000 for the shares of one input, and the middle.
-    let said = |text: &&String| text.contains("at most 34001 runs of the model");
+    // 200 points with 200 draws, 16 with all 1000, 2000 for the shares of one input, and the middle.
+    let said = |text: &&String| text.contains("at most 58001 runs of the model");
     assert!(ran.warnings.iter().chain(&ran.notes).any(|text| said(&text)), "{:?}", ran.notes);
     assert!(!ran.warnings.iter().any(|text| text.contains("independent searches")));
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();

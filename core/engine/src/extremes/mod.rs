@@ -4,22 +4,20 @@
 //! Two searches that share nothing are made, each from a Sobol' sequence shifted at random. For one function after the
 //! other, downwards and upwards, the best point known to that search is followed by L-BFGS-B with derivatives by
 //! differences; every point that is evaluated counts for all functions. The corners and the middle of the cube are
-//! evaluated besides. The extreme is the best of all; the distance from it of what the worse of the two searches found
-//! tells whether the search can be trusted.
+//! evaluated besides. Where the searches differ, both go on with further points of their sequences, and follow the best of
+//! these, until they agree or no points are left. The extreme is the best of all; the distance from it of what the worse of
+//! the two searches found tells whether the search can be trusted.
 
+mod half;
 mod objective;
 mod pool;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Mutex;
-
-use lacuna::math::random::{Stream, uniform};
-use lacuna::math::sobol;
+use lacuna::math::random::Stream;
 use lacuna_linalg::Matrix;
-use lacuna_optimise::{Precision, ascend};
 
-use self::objective::Objective;
+use self::half::Half;
 use self::pool::Pool;
 
 /// Extent of a search.
@@ -78,20 +76,11 @@ impl Towards {
     }
 }
 
-/// Share of the points that covers the cube before functions are followed.
-const COVER: usize = 3;
-
-/// Largest number of points that cover the cube in one search.
-const MOST_COVER: usize = 1024;
+/// Share of the width of a function's values by which the results of both searches may differ at the end.
+const AGREES: f64 = 0.01;
 
 /// Largest dimension in which all corners are evaluated, and the share of the points that they may take.
 const CORNERS: (usize, usize) = (8, 4);
-
-/// Unit length of the search in the cube.
-const SCALE: f64 = 0.3;
-
-/// Slopes are those of functions divided by their range.
-const PRECISION: Precision = Precision { gradient: 1e-4, gain: Some(1e-8), steps: 20 };
 
 /// Searches for the extremes of functions; `evaluate` gives all of them (columns) at points of the unit cube (rows), NaN
 /// where one is undefined.
@@ -104,8 +93,32 @@ pub fn extremes(
     let each = plan.points.saturating_sub(shared.len()) / 2;
     let mut common = Pool::new(evaluate, shared.len());
     common.at(&shared);
-    let halves: Vec<Pool<'_>> = (0..2).map(|k| half(plan, each, &stream.at(k), evaluate)).collect();
-    collect(common, halves)
+    let mut halves = [0, 1].map(|k| Half::new(plan.dimension, each, &stream.at(k), evaluate));
+    let all: Vec<Sought> =
+        plan.followed.iter().flat_map(|&f| Towards::BOTH.map(|towards| (f, towards))).collect();
+    let mut open = all.clone();
+    while !open.is_empty() && halves.iter().any(|half| !half.pool.exhausted) {
+        halves.iter_mut().for_each(|half| half.go_on(&open));
+        open = all.iter().copied().filter(|&sought| differ(&common, &halves, sought)).collect();
+    }
+    collect(common, halves.map(|half| half.pool))
+}
+
+/// A function and a direction.
+type Sought = (usize, Towards);
+
+/// Returns true if the searches disagree about an extreme.
+fn differ(common: &Pool<'_>, halves: &[Half<'_>; 2], (function, towards): Sought) -> bool {
+    let pools = || [common, &halves[0].pool, &halves[1].pool].into_iter();
+    let best = |to: Towards| {
+        let each = pools().filter_map(|pool| pool.best(function, to)).map(|(_, v)| to.signed(v));
+        each.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let width = Towards::BOTH.iter().map(|&to| best(to)).sum::<f64>();
+    let of_half = |half: &Half<'_>| {
+        half.pool.best(function, towards).map_or(f64::NEG_INFINITY, |(_, v)| towards.signed(v))
+    };
+    width > 0.0 && halves.iter().any(|half| best(towards) - of_half(half) > AGREES * width)
 }
 
 /// The middle of the cube, and its corners unless these are too many.
@@ -119,52 +132,8 @@ fn shared(plan: &Plan) -> Vec<Vec<f64>> {
     all
 }
 
-/// One of the two searches, with at most `points` points.
-fn half<'a>(
-    plan: &Plan,
-    points: usize,
-    stream: &Stream,
-    evaluate: &'a (dyn Fn(&Matrix) -> Matrix + Sync),
-) -> Pool<'a> {
-    let mut generator = stream.generator();
-    let shift: Vec<f64> = (0..plan.dimension).map(|_| uniform(&mut generator)).collect();
-    let cover = (points / COVER).clamp(1, MOST_COVER) as u32;
-    let place = |i: u32| {
-        let even = sobol::point(i, plan.dimension);
-        even.iter().zip(&shift).map(|(x, s)| (x + s).fract()).collect()
-    };
-    let start: Vec<Vec<f64>> = (0..cover).map(place).collect();
-    let mut pool = Pool::new(evaluate, points);
-    pool.at(&start);
-    for &function in &plan.followed {
-        for towards in Towards::BOTH {
-            pool = follow(pool, function, towards);
-        }
-    }
-    pool
-}
-
-/// Follows one function from the best point that is known.
-fn follow(pool: Pool<'_>, function: usize, towards: Towards) -> Pool<'_> {
-    let ends = Towards::BOTH.map(|to| pool.best(function, to).map(|(_, value)| value));
-    let Some(start) = pool.best(function, towards).map(|(row, _)| pool.points[row].clone()) else {
-        return pool;
-    };
-    let [Some(low), Some(high)] = ends else { return pool };
-    // Nothing varies beyond rounding.
-    if high - low <= 1e-12 * high.abs().max(low.abs()) {
-        return pool;
-    }
-    let scales = vec![SCALE; start.len()];
-    let shared = Mutex::new(pool);
-    let objective = Objective { pool: &shared, function, towards, origin: low, range: high - low };
-    // The pool remembers every point of the search, its end among them.
-    let _ = ascend(&objective, &start, &scales, PRECISION);
-    shared.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner)
-}
-
 /// The best of all points.
-fn collect(common: Pool<'_>, halves: Vec<Pool<'_>>) -> Extremes {
+fn collect(common: Pool<'_>, halves: [Pool<'_>; 2]) -> Extremes {
     let exhausted = halves.iter().any(|half| half.exhausted);
     let functions = common.values.first().map_or(0, Vec::len);
     let of_halves = |function: usize, to: Towards| {

@@ -14,9 +14,9 @@ use super::pool::Pool;
 const STEP: f64 = 0.01;
 
 /// A function divided by its range, largest where the search goes.
-pub(super) struct Objective<'a, 'b> {
+pub(super) struct Objective<'a, 'b, 'c> {
     /// The points of the search.
-    pub pool: &'a Mutex<Pool<'b>>,
+    pub pool: &'a Mutex<&'b mut Pool<'c>>,
     /// Number of the function.
     pub function: usize,
     /// Direction of the search.
@@ -27,7 +27,7 @@ pub(super) struct Objective<'a, 'b> {
     pub range: f64,
 }
 
-impl Objective<'_, '_> {
+impl Objective<'_, '_, '_> {
     fn scaled(&self, value: f64) -> f64 {
         self.towards.signed((value - self.origin) / self.range)
     }
@@ -65,7 +65,7 @@ fn slope([below, here, above]: [(f64, f64); 3]) -> f64 {
     }
 }
 
-impl Target for Objective<'_, '_> {
+impl Target for Objective<'_, '_, '_> {
     fn dimension(&self) -> usize {
         self.pool.lock().map_or(0, |pool| pool.points.first().map_or(0, Vec::len))
     }

@@ -44,9 +44,19 @@ impl<'a> Pool<'a> {
 
     /// Row and value of the best point of a function, the first of equals; `None` if it is defined nowhere.
     pub fn best(&self, function: usize, towards: Towards) -> Option<(usize, f64)> {
+        self.best_of(0..self.points.len(), function, towards)
+    }
+
+    /// Row and value of the best of some points.
+    pub fn best_of(
+        &self,
+        rows: impl Iterator<Item = usize>,
+        function: usize,
+        towards: Towards,
+    ) -> Option<(usize, f64)> {
         let mut best: Option<(usize, f64)> = None;
-        for (row, values) in self.values.iter().enumerate() {
-            let value = values[function];
+        for row in rows {
+            let value = self.values[row][function];
             let better = |(_, known): (usize, f64)| towards.signed(value) > towards.signed(known);
             if value.is_finite() && best.is_none_or(better) {
                 best = Some((row, value));
