@@ -263,6 +263,49 @@ fn the_error_of_the_emulator_is_in_the_bounds() {
     assert_eq!(summary["quantities"]["y"]["includes"], serde_json::json!(["emulator"]));
 }
 
+/// Over data of many seeds the exact bounds lie within two printed standard errors as often as those of a normal error,
+/// 95.4 %: the search over the interval adds nothing to the error of the draws.
+#[test]
+fn bounds_are_as_near_as_their_errors_say() {
+    let parameters = [("x", "{ normal = [1.0, 0.5] }"), ("c", "{ interval = [0.0, 1.0] }")];
+    let search = "[forward.intervals]\npoints = 60\n";
+    let folder = written(&parameters, "(c - 0.3)^2 + (1 + c) * x", search);
+    // The mean is largest at 1, and smallest at 0: the slope 2 (c - 0.3) + 1 is positive. At given c the standard deviation is
+    // (1 + c) / 2.
+    let figures = [("mean", 0.0), ("sd", 0.0), ("median", 0.0), ("q975", Z)];
+    let exact = |figure: &str, z: f64, c: f64| {
+        let sd = 0.5 * (1.0 + c);
+        if figure == "sd" { sd } else { (c - 0.3).powi(2) + 1.0 + c + z * sd }
+    };
+    let mut inside = [[0; 2]; 4];
+    for seed in 0..SEEDS {
+        let out = folder.path().join(format!("out{seed}"));
+        let settings = [format!("study.seed={seed}"), String::from("forward.draws=400")];
+        let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
+        quick::run(&folder.path().join("study.toml"), &settings, &out).unwrap();
+        let summary = quick::summary(&out);
+        let found = &summary["quantities"]["y"];
+        for (k, (figure, z)) in figures.into_iter().enumerate() {
+            for (end, (side, c)) in [("lower", 0.0), ("upper", 1.0)].into_iter().enumerate() {
+                let value = number(found, &format!("/bounds/{figure}/{side}"));
+                let error = number(found, &format!("/bounds/{figure}/{side}_error"));
+                inside[k][end] += usize::from((value - exact(figure, z, c)).abs() < 2.0 * error);
+            }
+        }
+    }
+    // Eight counts: each is outside its band with a probability of 0.1 %.
+    let band = lacuna::diagnose::coverage::binomial::band(SEEDS, 0.9545, 0.001);
+    for (counts, (figure, _)) in inside.into_iter().zip(figures) {
+        assert!(
+            counts.iter().all(|count| (band[0]..=band[1]).contains(count)),
+            "{figure}: {counts:?}"
+        );
+    }
+}
+
+/// Number of seeds that are counted.
+const SEEDS: usize = 60;
+
 /// A peak in a corner that neither search finds: the bound holds it, and a warning says that the searches differ.
 #[test]
 fn a_search_that_misses_is_told() {

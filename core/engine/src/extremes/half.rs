@@ -1,6 +1,6 @@
 //! One of the two searches.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use lacuna::math::random::{Stream, uniform};
 use lacuna::math::sobol;
@@ -84,6 +84,5 @@ impl<'a> Half<'a> {
             Objective { pool: &shared, function, towards, origin: low, range: high - low };
         // The pool remembers every point of the search, its end among them.
         let _ = ascend(&objective, &start, &scales, PRECISION);
-        drop(shared.into_inner().unwrap_or_else(PoisonError::into_inner));
     }
 }

@@ -27,7 +27,7 @@ pub(in super::super) fn evaluations(study: &Study, draws: usize) -> usize {
         return 0;
     }
     if !study.has_distributions() {
-        return size.points + FINAL * study.quantities.len();
+        return size.points;
     }
     let last = if size.draws < draws { FINAL * study.quantities.len() * draws } else { 0 };
     size.points * size.draws.min(draws) + last
