@@ -109,8 +109,8 @@ fn a_shift_by_an_interval() {
             assert!(off.abs() < 1.5 * ERRORS * error, "{key} {p}: {off} {error}");
         }
     }
-    // 200 points with 200 draws, 16 with all 1000, 2000 for the shares of one input, and the middle.
-    let said = |text: &&String| text.contains("at most 58001 runs of the model");
+    // 368 points with 200 draws, 16 with all 1000, 2000 for the shares of one input, and the middle.
+    let said = |text: &&String| text.contains("at most 91601 runs of the model");
     assert!(ran.warnings.iter().chain(&ran.notes).any(|text| said(&text)), "{:?}", ran.notes);
     assert!(!ran.warnings.iter().any(|text| text.contains("independent searches")));
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
@@ -181,8 +181,8 @@ fn the_algebraic_challenge_problem_with_intervals() {
     assert!(run(folder.path(), &[]).0.made.is_empty());
 }
 
-/// Challenge problem 4 there: `a` in [0.1, 1], the logarithm of `b` normal with its mean in [0, 1] and its standard deviation in
-/// [0.1, 0.5], intervals of a distribution's own parameters. At given parameters a quantile of `y` is `(a + b_p)^a`, since `y`
+/// The same with a log-normal `b`, as in the later problems there: the logarithm is normal, and its mean in [0, 1] and standard
+/// deviation in [0.1, 0.5] are intervals themselves. At given parameters a quantile of `y` is `(a + b_p)^a`, since `y`
 /// grows with `b`; its extremes over the parameters follow from a fine grid.
 #[test]
 fn the_algebraic_challenge_problem_with_a_log_normal_input() {
@@ -192,8 +192,7 @@ fn the_algebraic_challenge_problem_with_a_log_normal_input() {
         ("sigma", "{ interval = [0.1, 0.5] }"),
         ("z", "{ normal = [0.0, 1.0] }"),
     ];
-    let search = "[forward.intervals]\npoints = 400\ndraws = 200\n";
-    let folder = written(&parameters, "(a + exp(mu + sigma * z))^a", search);
+    let folder = written(&parameters, "(a + exp(mu + sigma * z))^a", "");
     let (_, summary) = run(folder.path(), &["forward.draws=2000"]);
     let found = &summary["quantities"]["y"];
     for (figure, z) in [("q025", -Z), ("median", 0.0), ("q975", Z)] {
@@ -304,7 +303,7 @@ fn bounds_are_as_near_as_their_errors_say() {
 }
 
 /// Number of seeds that are counted.
-const SEEDS: usize = 60;
+const SEEDS: usize = 40;
 
 /// A peak in a corner that neither search finds: the bound holds it, and a warning says that the searches differ.
 #[test]

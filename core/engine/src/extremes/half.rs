@@ -21,7 +21,10 @@ const MOST_COVER: usize = 1024;
 const SCALE: f64 = 0.3;
 
 /// Slopes are those of functions divided by their range.
-const PRECISION: Precision = Precision { gradient: 1e-4, gain: Some(1e-8), steps: 20 };
+const PRECISION: Precision = Precision { gradient: 3e-3, gain: Some(1e-6), steps: 20 };
+
+/// Smallest number of slopes that a search may take.
+const FEWEST_SLOPES: usize = 3;
 
 /// A search with points of its own.
 pub(super) struct Half<'a> {
@@ -31,6 +34,8 @@ pub(super) struct Half<'a> {
     shift: Vec<f64>,
     /// Number of points of the sequence that were used.
     used: u32,
+    /// Functions whose last search was cut.
+    unfinished: Vec<Sought>,
 }
 
 impl<'a> Half<'a> {
@@ -43,7 +48,7 @@ impl<'a> Half<'a> {
     ) -> Self {
         let mut generator = stream.generator();
         let shift = (0..dimension).map(|_| uniform(&mut generator)).collect();
-        Self { pool: Pool::new(evaluate, points), points, shift, used: 0 }
+        Self { pool: Pool::new(evaluate, points), points, shift, used: 0, unfinished: Vec::new() }
     }
 
     /// Covers the cube with further points of the sequence, and follows functions from the best of these.
@@ -57,12 +62,20 @@ impl<'a> Half<'a> {
         };
         let cover: Vec<Vec<f64>> = (self.used..self.used + count).map(place).collect();
         self.used += count;
+        self.pool.begin(self.pool.room());
         let Some(new) = self.pool.at(&cover) else { return };
-        for &sought in all {
-            // In the first round what was found for other functions counts, later only what is new.
+        for (k, &sought) in all.iter().enumerate() {
+            // In the first round what was found for other functions counts, later only what is new, unless a search was cut.
             let known = 0..self.pool.points.len();
-            let rows = if is_first { known.collect() } else { new.clone() };
+            let is_open = is_first || self.unfinished.contains(&sought);
+            let rows = if is_open { known.collect() } else { new.clone() };
+            let few = FEWEST_SLOPES * (2 * self.shift.len() + 1);
+            self.pool.begin((self.pool.room() / (all.len() - k)).max(few));
             self.follow(sought, &rows);
+            self.unfinished.retain(|other| *other != sought);
+            if self.pool.ended {
+                self.unfinished.push(sought);
+            }
         }
     }
 

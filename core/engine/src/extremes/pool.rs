@@ -8,18 +8,34 @@ use super::Towards;
 pub(super) struct Pool<'a> {
     evaluate: &'a (dyn Fn(&Matrix) -> Matrix + Sync),
     most: usize,
+    /// Number of points at which the present search ends.
+    end: usize,
     /// The points.
     pub points: Vec<Vec<f64>>,
     /// Values of all functions at them.
     pub values: Vec<Vec<f64>>,
     /// True if more points were wanted than there may be.
     pub exhausted: bool,
+    /// True if the present search wanted more points than it may have.
+    pub ended: bool,
 }
 
 impl<'a> Pool<'a> {
     /// An empty pool for at most `most` points.
     pub fn new(evaluate: &'a (dyn Fn(&Matrix) -> Matrix + Sync), most: usize) -> Self {
-        Self { evaluate, most, points: Vec::new(), values: Vec::new(), exhausted: false }
+        let (points, values) = (Vec::new(), Vec::new());
+        Self { evaluate, most, end: most, points, values, exhausted: false, ended: false }
+    }
+
+    /// Number of points for which there is room.
+    pub fn room(&self) -> usize {
+        self.most.saturating_sub(self.points.len())
+    }
+
+    /// Begins a search of at most `points` further points.
+    pub fn begin(&mut self, points: usize) {
+        self.end = self.most.min(self.points.len() + points);
+        self.ended = false;
     }
 
     /// Rows of points, which are evaluated together where they are new; `None` if the pool has no room for them.
@@ -30,8 +46,10 @@ impl<'a> Pool<'a> {
                 new.push(point);
             }
         }
-        if self.points.len() + new.len() > self.most {
-            self.exhausted = true;
+        let count = self.points.len() + new.len();
+        if count > self.end {
+            self.ended = true;
+            self.exhausted |= count > self.most;
             return None;
         }
         if let Some(first) = new.first() {

@@ -12,8 +12,9 @@ use super::plain::Study;
 #[serde(default, deny_unknown_fields)]
 pub struct IntervalsSection {
     /// Largest number of points of the intervals' box at which the distribution of the quantities is computed. The search
-    /// ends earlier if its two independent halves agree. Default: 128 points, and `80 (2 k + 1)` for each quantity if `k` parameters have
-    /// intervals, at most 5000; without a surrogate `100 (k + 1)` if other parameters have distributions.
+    /// ends earlier if its two independent halves agree. Default: 128 points, and `80 (2 k + 1)` for each quantity if `k`
+    /// parameters have intervals, at most 5000; without a surrogate, if other parameters have distributions, `80 (2 k + 1)`
+    /// for all quantities together.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub points: Option<usize>,
     /// Number of draws of the distributions at each of these points. The bounds that are printed are computed anew with
@@ -56,11 +57,12 @@ impl Study {
         let section = self.forward.as_ref().and_then(|forward| forward.intervals.as_ref());
         let emulated = self.surrogate.is_some();
         let (k, asked) = (self.intervals().len(), self.quantities.len());
-        let thorough = (128 + 80 * asked * (2 * k + 1)).min(MOST_POINTS);
-        let affordable =
-            if emulated || !self.has_distributions() { thorough } else { 100 * (k + 1) };
+        // Without a surrogate each draw is a run of the model.
+        let is_cheap = emulated || !self.has_distributions();
+        let shares = if is_cheap { asked } else { asked.min(1) };
+        let thorough = (128 + 80 * shares * (2 * k + 1)).min(MOST_POINTS);
         SearchSize {
-            points: section.and_then(|own| own.points).unwrap_or(affordable),
+            points: section.and_then(|own| own.points).unwrap_or(thorough),
             draws: section.and_then(|own| own.draws).unwrap_or(if emulated { 1000 } else { 200 }),
         }
     }
