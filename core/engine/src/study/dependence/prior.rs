@@ -106,5 +106,6 @@ fn bounds<E: Error>(numbers: &[f64]) -> Result<[f64; 2], E> {
         [low, high] => return Ok([low, high]),
         _ => "`interval` to be [lower bound, upper bound]",
     };
-    Err(Error::custom(format!("expected {expected}, found {numbers:?}")))
+    let found: Vec<String> = numbers.iter().map(f64::to_string).collect();
+    Err(Error::custom(format!("expected {expected}, found [{}]", found.join(", "))))
 }
