@@ -7,9 +7,9 @@ use lacuna::math::sobol;
 use lacuna_linalg::Matrix;
 use lacuna_optimise::{Precision, ascend};
 
+use super::Sought;
 use super::objective::Objective;
 use super::pool::Pool;
-use super::{Sought, Towards};
 
 /// Share of the points that covers the cube before functions are followed, and that of each later round.
 const COVER: [usize; 2] = [4, 12];
@@ -25,6 +25,13 @@ const PRECISION: Precision = Precision { gradient: 3e-3, gain: Some(1e-6), steps
 
 /// Smallest number of slopes that a search may take.
 const FEWEST_SLOPES: usize = 3;
+
+/// Values to which one coordinate jumps from the end of a search.
+const JUMPS: [f64; 3] = [0.0, 0.5, 1.0];
+
+/// Largest number of searches that begin where one jumped to, and the gain from which one begins, as a share of the range.
+const MOST_JUMPS: usize = 4;
+const GAIN: f64 = 1e-3;
 
 /// A search with points of its own.
 pub(super) struct Half<'a> {
@@ -69,7 +76,8 @@ impl<'a> Half<'a> {
             let known = 0..self.pool.points.len();
             let is_open = is_first || self.unfinished.contains(&sought);
             let rows = if is_open { known.collect() } else { new.clone() };
-            let few = FEWEST_SLOPES * (2 * self.shift.len() + 1);
+            let d = self.shift.len();
+            let few = FEWEST_SLOPES * (2 * d + 1) + JUMPS.len() * d + 1;
             self.pool.begin((self.pool.room() / (all.len() - k)).max(few));
             self.follow(sought, &rows);
             self.unfinished.retain(|other| *other != sought);
@@ -80,22 +88,49 @@ impl<'a> Half<'a> {
     }
 
     /// Follows one function from the best of some points.
-    fn follow(&mut self, (function, towards): Sought, rows: &[usize]) {
-        let ends = Towards::BOTH.map(|to| self.pool.best(function, to).map(|(_, value)| value));
-        let [Some(low), Some(high)] = ends else { return };
+    fn follow(&mut self, sought: Sought, rows: &[usize]) {
+        let (function, towards) = sought;
+        let Some((low, high)) = self.pool.range(function) else { return };
         let Some((row, _)) = self.pool.best_of(rows.iter().copied(), function, towards) else {
             return;
         };
-        // Nothing varies beyond rounding.
-        if high - low <= 1e-12 * high.abs().max(low.abs()) {
-            return;
-        }
-        let start = self.pool.points[row].clone();
+        let mut start = self.pool.points[row].clone();
         let scales = vec![SCALE; start.len()];
-        let shared = Mutex::new(&mut self.pool);
-        let objective =
-            Objective { pool: &shared, function, towards, origin: low, range: high - low };
-        // The pool remembers every point of the search, its end among them.
-        let _ = ascend(&objective, &start, &scales, PRECISION);
+        for _ in 0..MOST_JUMPS {
+            let shared = Mutex::new(&mut self.pool);
+            let objective =
+                Objective { pool: &shared, function, towards, origin: low, range: high - low };
+            let Some(end) = ascend(&objective, &start, &scales, PRECISION) else { return };
+            match self.jump(&end.point, sought, GAIN * (high - low)) {
+                Some(better) => start = better,
+                None => return,
+            }
+        }
+    }
+
+    /// The best point that differs from this one in coordinates at an end or in the middle: in one of them, or in all that
+    /// gain by themselves; `None` if none gains enough. A search that follows slopes does not see beyond a valley; where
+    /// coordinates act separately, this does.
+    fn jump(&mut self, from: &[f64], (function, towards): Sought, gain: f64) -> Option<Vec<f64>> {
+        let places = |j: usize| {
+            JUMPS.map(|x| {
+                let mut moved = from.to_vec();
+                moved[j] = x;
+                moved
+            })
+        };
+        let here = self.pool.at(&[from.to_vec()])?[0];
+        let jumps: Vec<Vec<f64>> = (0..from.len()).flat_map(places).collect();
+        let mut rows = self.pool.at(&jumps)?;
+        let mut together = from.to_vec();
+        for (j, own) in rows.chunks(JUMPS.len()).enumerate() {
+            let of_coordinate = [here].into_iter().chain(own.iter().copied());
+            let (row, _) = self.pool.best_of(of_coordinate, function, towards)?;
+            together[j] = self.pool.points[row][j];
+        }
+        rows.extend(self.pool.at(&[together])?);
+        let value = |row: usize| towards.signed(self.pool.values[row][function]);
+        let (best, _) = self.pool.best_of(rows.into_iter(), function, towards)?;
+        (value(best) - value(here) > gain).then(|| self.pool.points[best].clone())
     }
 }

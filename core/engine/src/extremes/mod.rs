@@ -3,10 +3,11 @@
 //!
 //! Two searches that share nothing are made, each from a Sobol' sequence shifted at random. For one function after the
 //! other, downwards and upwards, the best point known to that search is followed by L-BFGS-B with derivatives by
-//! differences; every point that is evaluated counts for all functions. The corners and the middle of the cube are
-//! evaluated besides. Where the searches differ, both go on with further points of their sequences, and follow the best of
-//! these, until they agree or no points are left. The extreme is the best of all; the distance from it of what the worse of
-//! the two searches found tells whether the search can be trusted.
+//! differences, and from its end one coordinate after the other jumps to the middle and the ends; every point that is
+//! evaluated counts for all functions. The corners and the middle of the cube are evaluated besides. Where the searches
+//! differ, both go on with further points of their sequences, and follow the best of these, until they agree or no points
+//! are left. The extreme is the best of all; the distance from it of what the worse of the two searches found tells whether
+//! the search can be trusted.
 
 mod half;
 mod objective;
@@ -114,11 +115,12 @@ fn differ(common: &Pool<'_>, halves: &[Half<'_>; 2], (function, towards): Sought
         let each = pools().filter_map(|pool| pool.best(function, to)).map(|(_, v)| to.signed(v));
         each.fold(f64::NEG_INFINITY, f64::max)
     };
+    let varies = pools().any(|pool| pool.range(function).is_some());
     let width = Towards::BOTH.iter().map(|&to| best(to)).sum::<f64>();
     let of_half = |half: &Half<'_>| {
         half.pool.best(function, towards).map_or(f64::NEG_INFINITY, |(_, v)| towards.signed(v))
     };
-    width > 0.0 && halves.iter().any(|half| best(towards) - of_half(half) > AGREES * width)
+    varies && halves.iter().any(|half| best(towards) - of_half(half) > AGREES * width)
 }
 
 /// The middle of the cube, and its corners unless these are too many.

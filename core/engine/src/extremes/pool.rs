@@ -4,6 +4,9 @@ use lacuna_linalg::Matrix;
 
 use super::Towards;
 
+/// Share of the values up to which their differences may be those of rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// Evaluated points.
 pub(super) struct Pool<'a> {
     evaluate: &'a (dyn Fn(&Matrix) -> Matrix + Sync),
@@ -63,6 +66,13 @@ impl<'a> Pool<'a> {
     /// Row and value of the best point of a function, the first of equals; `None` if it is defined nowhere.
     pub fn best(&self, function: usize, towards: Towards) -> Option<(usize, f64)> {
         self.best_of(0..self.points.len(), function, towards)
+    }
+
+    /// Smallest and largest value of a function; `None` if it does not vary beyond rounding.
+    pub fn range(&self, function: usize) -> Option<(f64, f64)> {
+        let [low, high] = Towards::BOTH.map(|to| self.best(function, to).map(|(_, value)| value));
+        let (low, high) = (low?, high?);
+        (high - low > ROUNDING * high.abs().max(low.abs())).then_some((low, high))
     }
 
     /// Row and value of the best of some points.
