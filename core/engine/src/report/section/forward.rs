@@ -26,7 +26,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
     Some(Section { id: "forward", title: "Propagated priors", content })
 }
 
-/// What the results depend on.
+/// Distributions on which the results depend.
 fn given(found: &Propagated) -> &'static str {
     match (&found.bounds, found.inputs.is_empty()) {
         (None, _) => "the priors of the parameters",

@@ -7,11 +7,13 @@
 
 mod figures;
 mod search;
+mod warnings;
 
 use serde::{Deserialize, Serialize};
 
 pub use self::figures::PROBABILITIES;
-pub(super) use self::search::{bounds, evaluations};
+pub(super) use self::search::{bounds, evaluations, identity};
+pub(super) use self::warnings::warn;
 
 /// Bounds of all quantities.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,6 +4,7 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::ErrorPath;
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
+use serde_json::{Value, json};
 
 use super::super::Work;
 use super::super::inputs::PropagatedInputs;
@@ -31,6 +32,13 @@ pub(in super::super) fn evaluations(study: &Study, draws: usize) -> usize {
     }
     let last = if size.draws < draws { FINAL * study.quantities.len() * draws } else { 0 };
     size.points * size.draws.min(draws) + last
+}
+
+/// Everything of the study that its bounds depend on besides the distributions and the quantities; null without intervals.
+pub(in super::super) fn identity(study: &Study) -> Value {
+    let intervals = study.intervals();
+    let size = study.interval_search();
+    if intervals.is_empty() { Value::Null } else { json!([intervals, size.points, size.draws]) }
 }
 
 /// Bounds of all quantities; `None` without intervals. `stream` is that of the draws of the distributions.
