@@ -99,7 +99,9 @@ pub fn extremes(
         plan.followed.iter().flat_map(|&f| Towards::BOTH.map(|towards| (f, towards))).collect();
     let mut open = all.clone();
     while !open.is_empty() && halves.iter().any(|half| !half.pool.exhausted) {
-        halves.iter_mut().for_each(|half| half.go_on(&open));
+        for half in &mut halves {
+            half.go_on(&open);
+        }
         open = all.iter().copied().filter(|&sought| differ(&common, &halves, sought)).collect();
     }
     collect(common, halves.map(|half| half.pool))

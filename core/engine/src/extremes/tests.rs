@@ -2,11 +2,9 @@ use std::f64::consts::PI;
 
 use super::*;
 
-fn found(
-    dimension: usize,
-    points: usize,
-    functions: &[&(dyn Fn(&[f64]) -> f64 + Sync)],
-) -> Extremes {
+type Function<'a> = &'a (dyn Fn(&[f64]) -> f64 + Sync);
+
+fn found(dimension: usize, points: usize, functions: &[Function<'_>]) -> Extremes {
     let plan = Plan { dimension, followed: (0..functions.len()).collect(), points };
     let evaluate = |points: &Matrix| {
         Matrix::from_fn(points.rows(), functions.len(), |i, k| functions[k](points.row(i)))
