@@ -132,7 +132,7 @@ pub(super) fn check(study: &Study, root: &Node, complaints: &mut Complaints<'_>)
 
 /// First section of a study that is computed from distributions of all parameters.
 fn needs_priors(root: &Node) -> Option<String> {
-    let tables = ["target", "measurements", "discrepancy", "sampler", "gap"];
+    let tables = ["target", "measurements", "discrepancy", "sampler"];
     let table = tables.iter().find(|name| root.get(name).is_some());
     let list = root.get("reliability").map(|_| String::from("`[[reliability]]`"));
     table.map(|name| format!("`[{name}]`")).or(list)

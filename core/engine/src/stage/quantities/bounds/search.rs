@@ -18,6 +18,9 @@ use crate::study::quantity::Asked;
 /// Largest number of points of the box for each quantity at which bounds are computed with all draws.
 const FINAL: usize = 16;
 
+/// Share of a figure up to which differences may be those of rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// Distance in the unit cube below which bounds of quantiles share a point.
 const NEAR: f64 = 0.02;
 
@@ -195,11 +198,12 @@ struct Ends<'a> {
 }
 
 impl Ends<'_> {
-    /// Row with the smallest (`sign` 1) or largest (-1) value of a figure, the first of equals.
+    /// Row with the smallest (`sign` 1) or largest (-1) value of a figure, the first of those that are equal up to rounding.
     fn row(&self, figure: usize, sign: f64) -> Option<usize> {
         let value = |row: usize| sign * self.rows[row][figure];
-        let defined = (0..self.rows.len()).filter(|&row| value(row).is_finite());
-        defined.min_by(|&a, &b| value(a).total_cmp(&value(b)))
+        let defined = || (0..self.rows.len()).filter(|&row| value(row).is_finite());
+        let least = defined().map(value).min_by(f64::total_cmp)?;
+        defined().find(|&row| value(row) <= least + ROUNDING * least.abs())
     }
 
     fn bounds(&self, quantity: usize) -> Option<Bounds> {
