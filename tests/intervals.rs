@@ -112,7 +112,7 @@ fn a_shift_by_an_interval() {
     // 368 points with 200 draws, 16 with all 1000, 2000 for the shares of one input, and the middle.
     let said = |text: &&String| text.contains("at most 91601 runs of the model");
     assert!(ran.warnings.iter().chain(&ran.notes).any(|text| said(&text)), "{:?}", ran.notes);
-    assert!(!ran.warnings.iter().any(|text| text.contains("independent searches")));
+    assert_eq!(ran.findings.assessment.of_code("interval_search").count(), 0);
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     assert!(page.contains("Bounds over intervals") && page.contains("probability box of y"));
     assert!(page.contains("interval [−1, 2]") || page.contains("interval [-1, 2]"));
@@ -305,7 +305,7 @@ fn bounds_are_as_near_as_their_errors_say() {
 /// Number of seeds that are counted.
 const SEEDS: usize = 25;
 
-/// A peak in a corner that neither search finds: the bound holds it, and a warning says that the searches differ.
+/// A peak in a corner that neither search finds: the bound holds it, and the assessment says that the searches differ.
 #[test]
 fn a_search_that_misses_is_told() {
     let parameters = [("a", "{ interval = [0.0, 1.0] }"), ("b", "{ interval = [0.0, 1.0] }")];
@@ -315,8 +315,10 @@ fn a_search_that_misses_is_told() {
     let found = &summary["quantities"]["y"];
     assert_eq!(number(found, "/bounds/mean/upper"), 2.0);
     assert!(number(found, "/bounds/mean/difference") > 0.9, "{found}");
-    let told = |text: &String| text.contains("two independent searches") && text.contains("`y`");
-    assert!(ran.warnings.iter().any(told), "{:?}", ran.warnings);
+    let assessed = &ran.findings.assessment;
+    let told: Vec<&str> = assessed.of_code("interval_search").map(|f| f.place.as_str()).collect();
+    assert_eq!(told, ["y"], "{assessed:?}");
+    assert_eq!(assessed.level.words(), "trusted with reservations");
 }
 
 /// The mean of a quantity that is 1 or 0 is a probability: `P(x + c > 2.5)` for normal `x` is Φ(-3) at `c = 0` and Φ(1) at `c = 2`.
@@ -352,7 +354,7 @@ fn many_intervals() {
     for (figure, z) in [("mean", 0.0), ("median", 0.0), ("q975", Z)] {
         bounded(found, figure, [0.1 * z, upper + 0.1 * z]);
     }
-    assert!(!ran.warnings.iter().any(|text| text.contains("independent searches")));
+    assert_eq!(ran.findings.assessment.of_code("interval_search").count(), 0);
 }
 
 /// A parameter for each scenario is an interval for each, and a quantity that is undefined in a part of the box is told.

@@ -11,6 +11,8 @@ mod warnings;
 
 use serde::{Deserialize, Serialize};
 
+use crate::assess::intervals::AGREES;
+
 pub use self::figures::PROBABILITIES;
 pub(super) use self::search::{bounds, evaluations, identity};
 pub(super) use self::warnings::warn;
@@ -100,9 +102,6 @@ pub struct End {
     /// Distance of the results of two independent searches, with the draws of the search.
     pub difference: f64,
 }
-
-/// Share of the width of a range by which two searches may differ before it is said.
-const AGREES: f64 = 0.02;
 
 impl Range {
     /// Returns true if two independent searches found the same ends: to 2 % of the width, or within the standard error.

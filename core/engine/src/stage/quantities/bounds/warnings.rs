@@ -4,7 +4,7 @@ use lacuna::run::Observer;
 
 use super::super::Quantified;
 
-/// Warns of bounds that the search may have missed, and of those of quantities that are undefined at some draws.
+/// Warns of bounds of quantities that are undefined at some draws.
 pub(in super::super) fn warn(quantified: &Quantified, observer: &dyn Observer) {
     let Some(found) = quantified.propagated.as_ref().and_then(|all| all.bounds.as_ref()) else {
         return;
@@ -16,17 +16,6 @@ pub(in super::super) fn warn(quantified: &Quantified, observer: &dyn Observer) {
                 .warn(&format!("the quantity `{name}` is undefined everywhere in the intervals"));
             continue;
         };
-        let named = bounds.named();
-        let doubtful: Vec<&str> =
-            named.iter().filter(|(_, range)| !range.is_agreed()).map(|(name, _)| *name).collect();
-        if !doubtful.is_empty() {
-            observer.warn(&format!(
-                "two independent searches over the intervals found different bounds of `{name}` ({}); true bounds may lie \
-                 farther apart. Raise `forward.intervals.points`, now {}",
-                doubtful.join(", "),
-                found.points
-            ));
-        }
         if bounds.undefined > 0 {
             observer.warn(&format!(
                 "the quantity `{name}` is undefined at up to {} of {} draws in the intervals; its bounds are those of the \
