@@ -19,6 +19,7 @@ mod forward;
 mod gap;
 mod gate;
 mod hierarchy;
+mod intervals;
 mod kill;
 mod left_out;
 mod made_by;

@@ -125,9 +125,14 @@ pub fn check(path: &Path, settings: &Settings) -> anyhow::Result<()> {
     let parameters = study.parameters.len();
     print(&format!("{}: no problems; {parameters} parameters{response}", path.display()));
     if let Some(runs) = stage::quantities::runs(&study) {
-        print(&format!(
-            "the priors are propagated with {runs} runs of the model (`forward.draws`)"
-        ));
+        print(&if study.intervals().is_empty() {
+            format!("the priors are propagated with {runs} runs of the model (`forward.draws`)")
+        } else {
+            format!(
+                "priors and intervals are propagated with at most {runs} runs of the model (`forward.draws`, \
+                 `forward.intervals`)"
+            )
+        });
     }
     Ok(())
 }

@@ -9,6 +9,7 @@ pub mod augment;
 pub mod campaign;
 pub mod compare;
 pub mod coverage;
+pub mod extremes;
 pub mod gap;
 pub mod host;
 pub mod page;

@@ -12,6 +12,7 @@ pub mod envelope;
 mod finding;
 pub mod fit;
 pub mod influence;
+pub mod intervals;
 pub mod modes;
 pub mod population;
 pub mod prior;

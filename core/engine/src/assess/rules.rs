@@ -1,8 +1,8 @@
 //! Descriptions of all checks, for the documentation.
 
 use super::{
-    bounds, chains, conditions, correlation, emulator, envelope, fit, influence, modes, population,
-    prior, replicates, residuals, runs, suspicious,
+    bounds, chains, conditions, correlation, emulator, envelope, fit, influence, intervals, modes,
+    population, prior, replicates, residuals, runs, suspicious,
 };
 
 /// A type of finding.
@@ -38,6 +38,7 @@ pub fn rules() -> Vec<Rule> {
         residuals::rules(),
         influence::rules(),
         conditions::rules(),
+        intervals::rules(),
     ]
     .concat()
 }

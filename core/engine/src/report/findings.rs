@@ -13,7 +13,9 @@ use crate::screening::Screening;
 
 pub use crate::gap::result::GapFindings;
 use crate::stage::calibrate::PopulationOutcome;
-pub use crate::stage::quantities::{InputShare, Propagated, QuantityFindings};
+pub use crate::stage::quantities::{
+    Bounds, BoundsFindings, End, InputShare, PROBABILITIES, Propagated, QuantityFindings, Range,
+};
 pub use crate::stage::reliability::RareEvent;
 use crate::stage::screen::FlaggedCurve;
 use crate::stage::validate::ValidationFindings;
@@ -33,6 +35,8 @@ pub struct Findings {
     pub components: Vec<(String, String)>,
     /// Parameters of the model.
     pub parameters: Vec<Parameter>,
+    /// Places of the parameters of which intervals are known and no priors.
+    pub intervals: Vec<usize>,
     /// Facts about the dependence of the priors; empty if they are independent.
     pub prior: Vec<Fact>,
     /// Shapes of the responses, scenario by scenario.

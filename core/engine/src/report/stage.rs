@@ -82,6 +82,7 @@ fn findings(
         version: env!("CARGO_PKG_VERSION").to_owned(),
         components: components(study),
         parameters: study.parameters.clone(),
+        intervals: study.intervals(),
         prior: study.prior_facts(),
         layouts: study.layouts.clone(),
         ensemble: all

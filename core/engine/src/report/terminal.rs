@@ -4,8 +4,9 @@ use lacuna::run::Stop;
 
 use super::findings::Findings;
 use super::section::{
-    accuracy_table, banner, evidence, group_word, headline, population_table, posterior_table,
-    quantity_table, reliability_table, screening, share_table, view, without_table,
+    accuracy_table, banner, bounds_table, evidence, group_word, headline, population_table,
+    posterior_table, quantity_table, reliability_table, screening, share_table, view,
+    without_table,
 };
 use crate::gap::next::Wanted;
 use crate::gap::report;
@@ -49,12 +50,17 @@ pub fn summary_text(findings: &Findings) -> String {
     }
     if !findings.quantities.is_empty() {
         let table = quantity_table(&findings.quantities).text();
-        parts.push(format!("predicted quantities\n{table}"));
+        let bounded = findings.quantities.iter().any(|found| found.bounds.is_some());
+        let place = if bounded { " at the middle of the intervals" } else { "" };
+        parts.push(format!("predicted quantities{place}\n{table}"));
         if let Some(table) = without_table(&findings.quantities) {
             parts.push(format!("their standard deviation without one source\n{}", table.text()));
         }
         if let Some(table) = share_table(&findings.quantities) {
             parts.push(format!("shares of the inputs in their variance\n{}", table.text()));
+        }
+        if let Some(table) = bounds_table(findings) {
+            parts.push(format!("bounds over the intervals\n{}", table.text()));
         }
     }
     parts.join("\n")

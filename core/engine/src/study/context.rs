@@ -23,6 +23,7 @@ use lacuna::text::{Complaints, Node, Problems};
 use super::fidelity::LowFidelity;
 use super::plain::Study;
 use super::table::Chosen;
+use super::unknowns::Unknown;
 
 /// Reports everything that is inconsistent.
 pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
@@ -39,6 +40,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
         sections(study, &mut complaints);
     }
     parameters(study, &mut complaints);
+    super::intervals::check(study, root, &mut complaints);
     super::hierarchy::check(study, &mut complaints);
     runs(study, &mut complaints);
     more_runs::refinement(study, &mut complaints);
@@ -203,7 +205,8 @@ fn parameters(study: &Study, complaints: &mut Complaints<'_>) {
             };
             // Members differ by their group only.
             if population.is_none_or(|population| population.members[0] == i) {
-                inside_design(parameter, bulks[i], &path, complaints);
+                let interval = study.unknowns[i].interval;
+                inside_design(parameter, bulks[i], interval, &path, complaints);
             }
         }
         if let Some(value) = parameter.reference.filter(|value| !value.is_finite()) {
@@ -219,11 +222,15 @@ fn parameters(study: &Study, complaints: &mut Complaints<'_>) {
 /// Draws of a prior with constraints from which the central 95 % of each parameter is taken.
 const DRAWS: u64 = 4000;
 
-/// Central 95 % of the prior of each parameter: by draws if constraints change it.
+/// Central 95 % of the prior of each parameter, and the whole of an interval: by draws if constraints change it.
 fn bulks(study: &Study) -> Vec<[f64; 2]> {
     let tails = [0.025, 0.975];
     if study.dependence.constraints.is_empty() {
-        return study.parameters.iter().map(|p| tails.map(|t| p.prior.quantile(t))).collect();
+        let ends = |(p, unknown): (&Parameter, &Unknown)| {
+            let (low, high) = p.prior.support();
+            if unknown.interval { [low, high] } else { tails.map(|t| p.prior.quantile(t)) }
+        };
+        return study.parameters.iter().zip(&study.unknowns).map(ends).collect();
     }
     let stream = Stream::root(study.about.seed).named("prior");
     let draw = |i: u64| study.prior().sample(&mut stream.at(i).generator());
@@ -241,15 +248,18 @@ fn bulks(study: &Study) -> Vec<[f64; 2]> {
 fn inside_design(
     parameter: &Parameter,
     bulk: [f64; 2],
+    interval: bool,
     path: &str,
     complaints: &mut Complaints<'_>,
 ) {
     let (low, high) = parameter.design.support();
+    let (what, share) =
+        if interval { ("interval", "all of it") } else { ("prior", "95 % of the prior") };
     if bulk[0] < low || bulk[1] > high {
         complaints
             .at(path)
-            .say(format!("the prior of `{}` reaches beyond its design", parameter.name))
-            .expected(format!("95 % of the prior inside [{low}, {high}]"))
+            .say(format!("the {what} of `{}` reaches beyond its design", parameter.name))
+            .expected(format!("{share} inside [{low}, {high}]"))
             .found(format!("[{}, {}]", bulk[0], bulk[1]))
             .help("widen `design`: outside it the surrogate has no runs to learn from");
     }

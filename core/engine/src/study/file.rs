@@ -86,7 +86,8 @@ pub struct ParameterSection {
     pub design: Option<Distribution>,
     /// Prior distribution of the parameter in the calibration, in its unit. With a surrogate, the central 95 % of it
     /// must lie inside `design`. `{ posterior = "runs/a" }` is the posterior of an earlier run, joint with all parameters that
-    /// name the same run. A share of a Dirichlet distribution in `[[dependence]]` needs none.
+    /// name the same run. `{ interval = [1, 2] }` states bounds and no distribution, in a study without data. A share of a
+    /// Dirichlet distribution in `[[dependence]]` needs none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<Prior>,
     /// Reference value from the literature or from practice, in the parameter's unit. It is compared with the posterior

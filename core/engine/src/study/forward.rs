@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::dependence::Sections;
+use super::intervals::IntervalsSection;
 use super::plain::Study;
 
 /// Propagation of the priors of a study without measurements: the distribution of the response and of every
@@ -18,6 +19,9 @@ pub struct ForwardSection {
     /// 10000 with a surrogate; 1000 without one, where each evaluation is a run of the model.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub draws: Option<usize>,
+    /// Search for the bounds of the quantities over the intervals of parameters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intervals: Option<IntervalsSection>,
 }
 
 /// Smallest number of draws from which shares of a variance and their errors can be estimated.

@@ -11,6 +11,7 @@ pub mod gap;
 pub mod hierarchy;
 pub mod inherit;
 pub mod inputs;
+pub mod intervals;
 pub mod language;
 pub mod libraries;
 pub mod noise;

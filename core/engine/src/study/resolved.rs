@@ -50,6 +50,11 @@ pub(super) fn table(
                 table.insert("symbol".to_owned(), symbol.into());
                 table.insert("scenario".to_owned(), name.into());
             }
+            if unknown.interval {
+                let (low, high) = parameter.prior.support();
+                let ends = ("interval".to_owned(), vec![low, high].into());
+                table.insert("prior".to_owned(), Table::from_iter([ends]).into());
+            }
             if let Some(run) = study.dependence_sections.run_of(&parameter.name) {
                 let posterior = ("posterior".to_owned(), run.display().to_string().into());
                 table.insert("prior".to_owned(), Table::from_iter([posterior]).into());

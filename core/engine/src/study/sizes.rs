@@ -110,6 +110,12 @@ fn needs(study: &Study) -> Vec<Need> {
         // The values of all quantities in a few variants, and the inputs.
         let asked = study.quantities.len() as f64;
         add("forward.draws", "the draws", draws, parameters + 10.0 * asked);
+        if !study.intervals().is_empty() {
+            // The figures and the bounds of the distribution of each quantity.
+            let search = study.interval_search();
+            add("forward.intervals.points", "the points", search.points, parameters + 50.0 * asked);
+            add("forward.intervals.draws", "the draws", search.draws, parameters + asked);
+        }
     }
     add("validate.emulator_check", "the runs", study.validate.emulator_check, run);
     if let Some(section) = &study.sampler {

@@ -5,7 +5,7 @@ use lacuna::math::distribution::Distribution;
 use lacuna::text::node::Node;
 use lacuna::text::{Complaints, Problems, nearest};
 
-use super::file::ParameterSection;
+use super::file::{ParameterSection, Prior};
 use super::hierarchy::{Member, members, of_sections};
 use super::table::PluginSections;
 
@@ -22,12 +22,21 @@ pub struct Unknown {
     /// True for location and scale of a population, on which no response depends directly.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub of_population: bool,
+    /// True if bounds of its value are known and no distribution; its prior is then that of the design points.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub interval: bool,
 }
 
 impl Unknown {
     /// An unknown that all scenarios share.
     pub fn shared(name: &str) -> Self {
-        Self { name: name.to_owned(), scenario: None, member: None, of_population: false }
+        Self {
+            name: name.to_owned(),
+            scenario: None,
+            member: None,
+            of_population: false,
+            interval: false,
+        }
     }
 
     /// Returns true if it acts in a scenario.
@@ -83,7 +92,8 @@ pub(super) fn unknowns(
             prior: prior.clone(),
             reference: section.reference,
         });
-        unknowns.push(Unknown { name, scenario, member: None, of_population: false });
+        let interval = matches!(section.prior, Some(Prior::Interval { .. }));
+        unknowns.push(Unknown { name, scenario, member: None, of_population: false, interval });
     };
     let named: Vec<&str> =
         scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();

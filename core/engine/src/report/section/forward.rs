@@ -17,13 +17,24 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
     let found = findings.propagated.as_ref()?;
     let content = html! {
         (response(findings, found, numbers))
-        (indices_of_response(findings, found, numbers))
-        @if !findings.quantities.is_empty() {
+        @if !found.inputs.is_empty() { (indices_of_response(findings, found, numbers)) }
+        @if !findings.quantities.is_empty() && !found.inputs.is_empty() {
             (shares(&findings.quantities, found, numbers))
             (bars(&findings.quantities, found, numbers))
         }
     };
     Some(Section { id: "forward", title: "Propagated priors", content })
+}
+
+/// Distributions on which the results depend.
+fn given(found: &Propagated) -> &'static str {
+    match (&found.bounds, found.inputs.is_empty()) {
+        (None, _) => "the priors of the parameters",
+        (Some(_), false) => {
+            "the priors of the parameters, those known as an interval only at its middle"
+        }
+        (Some(_), true) => "all parameters at the middle of their intervals",
+    }
 }
 
 /// Bands of the response.
@@ -64,7 +75,7 @@ fn response(findings: &Findings, found: &Propagated, numbers: &mut Numbers) -> M
     ];
     let caption = Caption::new(
         format!("Response of the model under the priors.{}", outlines.left_out_sentence()),
-        "the priors of the parameters, with the errors of emulator and numerics.",
+        format!("{}, with the errors of emulator and numerics.", given(found)),
         "a mean outside the band, or far from the median: the distribution is skewed there.",
     );
     numbers.figure(&small_multiples(&panels, &x, &y, "response under the priors"), &keys, &caption)
@@ -133,7 +144,7 @@ fn indices_of_response(findings: &Findings, found: &Propagated, numbers: &mut Nu
             fixed(error, 3),
             outlines.left_out_sentence()
         ),
-        "the priors of the parameters, without errors of emulator and numerics.",
+        format!("{}, without errors of emulator and numerics.", given(found)),
         "a total index far above the first order: the input acts through others. A gap: nothing varies there.",
     );
     let drawing = small_multiples(&both, &x, &y, "Sobol indices of the response");
@@ -165,7 +176,7 @@ fn shares(all: &[QuantityFindings], found: &Propagated, numbers: &mut Numbers) -
              Shapley effects add up to one.",
             found.samples
         ),
-        "the priors of the parameters, without errors of emulator and numerics.",
+        format!("{}, without errors of emulator and numerics.", given(found)),
         "a total index within a few standard errors of zero: the quantity does not depend on that input.",
     );
     numbers.table(&table, &caption)
@@ -207,7 +218,7 @@ fn bars(all: &[QuantityFindings], found: &Propagated, numbers: &mut Numbers) -> 
             "Shares of the inputs in the variance of each quantity.{}",
             super::first_of_quantities(all.len(), MOST)
         ),
-        "the priors of the parameters, without errors of emulator and numerics.",
+        format!("{}, without errors of emulator and numerics.", given(found)),
         "inputs whose measurement or tighter manufacture would help the prediction most.",
     );
     numbers.figure(&shown, &keys, &caption)

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::{banner, coordinate_unit, response_unit};
+use super::{banner, coordinate_unit, intervals, response_unit};
 use crate::gap::report::verdict;
 use crate::page::number::{decimals, fixed, percent, typeset};
 use crate::page::paragraph;
@@ -40,9 +40,12 @@ pub fn sentences(findings: &Findings) -> Vec<String> {
     if let Some(found) = &findings.propagated {
         let (samples, inputs) = (found.samples, found.inputs.len());
         let word = if inputs == 1 { "input" } else { "inputs" };
-        sentences.push(format!(
-            "The priors of {inputs} {word} were propagated through the model at {samples} draws; nothing was calibrated."
-        ));
+        if inputs > 0 {
+            sentences.push(format!(
+                "The priors of {inputs} {word} were propagated through the model at {samples} draws; nothing was calibrated."
+            ));
+        }
+        sentences.extend(found.bounds.as_ref().map(intervals::sentence));
     }
     if sentences.is_empty() {
         sentences.push(String::from("This run has no calibration yet."));

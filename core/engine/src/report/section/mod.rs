@@ -5,6 +5,7 @@ mod ensemble;
 pub mod evidence;
 mod forward;
 pub mod headline;
+mod intervals;
 mod measurements;
 mod overview;
 mod populations;
@@ -27,6 +28,7 @@ use crate::page::scale::ShownUnit;
 use crate::page::{Numbers, Section};
 
 pub use forward::share_table;
+pub use intervals::bounds_table;
 pub use populations::population_table;
 pub use posterior::posterior_table;
 pub use quantities::{quantity_table, without_table};
@@ -46,6 +48,7 @@ pub fn all(findings: &Findings, numbers: &mut Numbers) -> Vec<Section> {
         evidence::section(findings),
         validation::section(findings, numbers),
         quantities::section(findings, numbers),
+        intervals::section(findings, numbers),
         forward::section(findings, numbers),
         reliability::section(findings, numbers),
         findings.gap.as_ref().map(|gap| report::section(&view(findings), gap, numbers)),

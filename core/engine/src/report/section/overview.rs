@@ -24,7 +24,12 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Section {
             } else {
                 String::from("–")
             },
-            rounded(&p.prior.to_string(), 6),
+            if findings.intervals.contains(&j) {
+                let (low, high) = p.prior.support();
+                rounded(&format!("interval [{low}, {high}]"), 6)
+            } else {
+                rounded(&p.prior.to_string(), 6)
+            },
             p.reference.map_or_else(|| String::from("–"), exact),
         ]);
     }

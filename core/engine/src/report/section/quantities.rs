@@ -27,7 +27,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
 }
 
 /// Displayed unit of a quantity.
-fn unit(found: &QuantityFindings) -> ShownUnit {
+pub(super) fn unit(found: &QuantityFindings) -> ShownUnit {
     let own = Unit::parse(&found.unit).unwrap_or_default();
     ShownUnit::for_values(&own, [found.total.mean, found.total.q025, found.total.q975])
 }
@@ -104,7 +104,14 @@ fn worded(source: &str) -> String {
 
 fn predictions(all: &[QuantityFindings], numbers: &mut Numbers) -> Markup {
     let of_priors = all.iter().any(|found| found.of_priors);
-    let (whose, centre, given) = if of_priors {
+    let bounded = all.iter().any(|found| found.bounds.is_some());
+    let (whose, centre, given) = if bounded {
+        (
+            "the priors, with parameters known as an interval only at its middle,",
+            "value at the medians of the priors, without errors",
+            "one point of the intervals: the next section has the bounds over all of them.",
+        )
+    } else if of_priors {
         (
             "the priors",
             "value at the medians of the priors, without errors",

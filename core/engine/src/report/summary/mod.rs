@@ -5,6 +5,7 @@
 //! [`Quantity`], any other an `f64`. A key whose field is skipped if it is `None` is absent if the run did not compute
 //! it; other optional keys are `null`.
 
+mod bounds;
 mod gap;
 mod inputs;
 mod keys;
@@ -112,7 +113,10 @@ pub fn summary(findings: &Findings) -> Summary {
         surrogate: findings.surrogate.as_ref().map(|found| Surrogate::of(findings, found)),
         calibration: findings.calibration.as_ref().map(|found| Calibration::of(findings, found)),
         validation: findings.validation.as_ref().map(Validation::of),
-        quantities: quantities::by_name(&findings.quantities),
+        quantities: quantities::by_name(
+            &findings.quantities,
+            findings.propagated.as_ref().and_then(|found| found.bounds.as_ref()),
+        ),
         reliability: reliability::by_name(&findings.reliability),
         gap: findings.gap.as_ref().map(Gap::of),
         seconds: quantities(&findings.seconds),

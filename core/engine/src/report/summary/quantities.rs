@@ -3,8 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::bounds::QuantityBounds;
 use super::value::{ByName, Quantity};
-use crate::report::findings::{InputShare, QuantityFindings};
+use crate::report::findings::{BoundsFindings, InputShare, QuantityFindings};
 
 /// Prediction of one quantity of interest. Mean, standard deviation and quantiles contain the posterior of the parameters,
 /// in a study without measurements their priors, and the errors in `includes`.
@@ -32,6 +33,10 @@ pub struct PredictedQuantity {
     #[serde(skip_serializing_if = "ByName::is_empty")]
     #[schemars(extend("propertyNames" = { "title": "input" }))]
     pub sensitivity: ByName<Share>,
+    /// Bounds over the intervals of parameters, in a study without measurements that has some. All other numbers are then
+    /// those with these parameters at the middle of their intervals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bounds: Option<QuantityBounds>,
     /// Prediction with the distribution of the parameters alone, without any error.
     pub parameters: OfParameters,
     /// Standard deviation of the prediction with all sources of uncertainty but one; a source that the quantity does not
@@ -85,13 +90,17 @@ pub struct OfParameters {
     pub q975: f64,
 }
 
-/// Predicted quantities by their names.
-pub fn by_name(found: &[QuantityFindings]) -> ByName<PredictedQuantity> {
-    found.iter().map(|found| (found.name.clone(), PredictedQuantity::of(found))).collect()
+/// Predicted quantities by their names; `bounds` is what they were bounded over.
+pub fn by_name(
+    found: &[QuantityFindings],
+    bounds: Option<&BoundsFindings>,
+) -> ByName<PredictedQuantity> {
+    let one = |q: &QuantityFindings| (q.name.clone(), PredictedQuantity::of(q, bounds));
+    found.iter().map(one).collect()
 }
 
 impl PredictedQuantity {
-    fn of(found: &QuantityFindings) -> Self {
+    fn of(found: &QuantityFindings, bounds: Option<&BoundsFindings>) -> Self {
         let (total, parameters) = (found.total, found.parameters);
         Self {
             mean: total.mean.into(),
@@ -103,6 +112,11 @@ impl PredictedQuantity {
             at_medians: found.of_priors.then(|| found.map.into()),
             sensitivity: found.shares.iter().map(|s| (s.name.clone(), Share::of(s))).collect(),
             mcse_mean: found.mcse_mean,
+            bounds: found
+                .bounds
+                .as_ref()
+                .zip(bounds)
+                .map(|(own, all)| QuantityBounds::of(own, all)),
             parameters: OfParameters {
                 mean: parameters.mean.into(),
                 sd: parameters.sd,

@@ -6,6 +6,7 @@
 mod data;
 mod errors;
 mod fit;
+mod intervals;
 mod posterior;
 mod runs;
 
@@ -71,9 +72,11 @@ pub fn stage(
         laws,
         study.about.seed
     ]);
-    // Quantities matter to the checks only where they are predicted under conditions that were not measured.
-    let extrapolated = all.quantities.filter(|_| study.scenarios.iter().any(|s| s.unmeasured));
-    let inputs = match extrapolated {
+    // Quantities matter to the checks only where they are predicted under conditions that were not measured, or bounded.
+    let bounded = !study.intervals().is_empty();
+    let examined =
+        all.quantities.filter(|_| bounded || study.scenarios.iter().any(|s| s.unmeasured));
+    let inputs = match examined {
         Some(quantities) => json!([inputs, quantities.hash]),
         None => inputs,
     };
@@ -110,6 +113,7 @@ fn assess(study: &Study, all: &Artifacts<'_>) -> Result<Assessment, Stop> {
         let unmeasured = study.scenarios.iter().filter(|scenario| scenario.unmeasured);
         findings.extend(unmeasured.filter_map(|s| conditions::beyond(s, &study.scenarios)));
     }
+    findings.extend(all.quantities.iter().flat_map(|kept| intervals::findings(&kept.value)));
     if let Some(left) = all.weighed.and_then(|kept| kept.value.left_out.as_ref()) {
         findings.extend(influence::influential(left.unreliable, left.data.len()));
     }

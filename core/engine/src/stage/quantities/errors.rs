@@ -90,6 +90,19 @@ impl Errors {
         Self::Prior(Vec::new())
     }
 
+    /// Returns true if there are no errors.
+    pub fn is_none(&self) -> bool {
+        matches!(self, Self::Prior(common) if common.is_empty())
+    }
+
+    /// Number of errors of emulator and numerics.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Prior(common) | Self::Sampled { common, .. } => common.len(),
+            Self::Given(given) => given.predictive.len(),
+        }
+    }
+
     /// One draw of all errors around the response at a point of the posterior.
     pub fn draw(&self, response: &[f64], point: &[f64], stream: &Stream) -> Vec<ErrorPath> {
         match self {

@@ -4,7 +4,7 @@ use lacuna::math::moments::{mean, quantile, sorted, variance};
 
 use lacuna_linalg::Matrix;
 
-use super::{Quantified, Variant};
+use super::{Bounds, Quantified, Variant};
 
 /// A predicted quantity. All figures are in its unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +25,9 @@ pub struct QuantityFindings {
     pub of_priors: bool,
     /// Shares of the inputs in the variance, in a study without data.
     pub shares: Vec<InputShare>,
+    /// Bounds over the intervals of parameters, in a study without data that has some; all other figures are then those at
+    /// the middle of the intervals.
+    pub bounds: Option<Bounds>,
     /// Draws of the prediction at which it is defined.
     pub values: Vec<f64>,
     /// Monte Carlo standard error of the mean of `total`.
@@ -132,6 +135,7 @@ impl Quantified {
             map: self.map[i],
             of_priors: self.propagated.is_some(),
             shares: self.shares(i),
+            bounds: self.bounds(i).cloned(),
             mcse_mean: error.sqrt(),
             without: without.collect(),
             includes: about.includes.clone(),
@@ -140,6 +144,11 @@ impl Quantified {
             undefined: self.draws.columns() - kept.len(),
             values: kept,
         }
+    }
+
+    /// Bounds of a quantity over the intervals of parameters.
+    fn bounds(&self, quantity: usize) -> Option<&Bounds> {
+        self.propagated.as_ref()?.bounds.as_ref()?.quantities[quantity].as_ref()
     }
 
     /// Shares of the inputs in the variance of a quantity.

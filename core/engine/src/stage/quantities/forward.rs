@@ -1,16 +1,18 @@
 //! Propagation of the priors of a study without data: response and quantities, and the shares of the parameters in their
 //! variance.
 
-use lacuna::math::distribution::Distribution;
 use lacuna::math::moments::{mean, quantile, sorted, variance};
 use lacuna::math::random::Stream;
+use lacuna::plugin::Forward;
 use lacuna::run::{Progress, Stop};
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
+use super::bounds::{self, BoundsFindings};
 use super::errors::Errors;
+use super::inputs::PropagatedInputs;
 use super::{Basis, Quantified, Work};
-use crate::sensitivity::{Independent, Indices, Inputs as _, evaluations, indices};
+use crate::sensitivity::{Indices, evaluations, indices};
 use crate::stage::inverse_problem::{InverseProblem, Route};
 use crate::stage::predict;
 use crate::stage::predictions::Chosen;
@@ -20,7 +22,7 @@ use crate::study::quantity::in_default;
 /// Consequences of the priors of a study besides the draws of its quantities.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Propagated {
-    /// Names of the uncertain inputs: the parameters, then the unknowns of effects.
+    /// Names of the inputs with distributions: the parameters, then the unknowns of effects.
     pub inputs: Vec<String>,
     /// Number of samples of the indices.
     pub samples: usize,
@@ -30,6 +32,9 @@ pub struct Propagated {
     pub response: Indices,
     /// Distribution of the response with the errors of emulator and numerics.
     pub bands: Bands,
+    /// Bounds of the quantities over the intervals of parameters. All else is given with these parameters at the middle of
+    /// their intervals.
+    pub bounds: Option<BoundsFindings>,
 }
 
 /// Figures of the response, output by output.
@@ -47,51 +52,41 @@ pub struct Bands {
     pub q975: Vec<f64>,
 }
 
-/// Uncertain inputs of a study: names and priors of its parameters, and of the unknowns of its effects.
-pub(super) fn priors(study: &Study) -> Vec<(String, Distribution)> {
-    let own = study.parameters.iter().map(|p| (p.name.clone(), p.prior.clone()));
-    let of_effects = study.placed_effects().into_iter().flat_map(|e| e.hyperparameters());
-    own.chain(of_effects.map(|unknown| (unknown.name, unknown.prior))).collect()
-}
-
-/// Number of runs of the model that the propagation makes, in a study that has neither data nor a surrogate.
+/// Number of runs of the model that the propagation makes, at most if there are intervals, in a study that has neither data
+/// nor a surrogate.
 pub fn runs(study: &Study) -> Option<usize> {
     let draws = study.propagated().filter(|_| study.surrogate.is_none())?;
-    let each = evaluations(priors(study).len(), true, draws) + 1;
-    Some(each * study.scenarios.len().max(1))
+    let of_laws = match PropagatedInputs::of(study).laws.len() {
+        0 => 1,
+        count => evaluations(count, true, draws),
+    };
+    let each = of_laws.saturating_add(bounds::evaluations(study, draws)).saturating_add(1);
+    Some(each.saturating_mul(study.scenarios.len().max(1)))
 }
 
-/// Propagates the priors.
+/// Propagates the priors, and bounds the quantities over the intervals.
 pub(super) fn propagate(
     study: &Study,
     problem: &InverseProblem<'_>,
     samples: usize,
     progress: &Progress<'_>,
 ) -> Result<Quantified, Stop> {
-    let (names, laws): (Vec<String>, Vec<Distribution>) = priors(study).into_iter().unzip();
-    let centre: Vec<f64> = laws.iter().map(|law| law.quantile(0.5)).collect();
-    let inputs = Independent(laws);
+    let inputs = PropagatedInputs::of(study);
     let errors = Errors::of_priors(study, problem)?;
     let forward = problem.forward();
     let work = Work::new(study, Some(forward), errors, progress);
     let stream = work.random.named("prior");
     let outputs = forward.outputs();
-    let count = predict::affordable(samples, outputs);
-    let mut held: Vec<Vec<f64>> = Vec::new();
-    let keep = |i: usize, values: &[f64]| {
-        if i < count {
-            held.push(values[..outputs].to_vec());
-        }
-    };
-    let both = indices(&inputs, samples, &stream, |points| work.everything(points), keep);
+    let (both, held) = evaluated(&work, &inputs, samples, &stream);
     if let Some(reason) = forward.failure() {
         return Err(Stop::new(reason));
     }
     if held.iter().flatten().all(|value| value.is_nan()) {
         return Err(Stop::new("the model has a response at no draw of the priors"));
     }
+    let count = held.len();
     let points = Matrix::from_rows(
-        inputs.dimension(),
+        inputs.middle.len(),
         (0..count).map(|i| inputs.draw(&stream.at(i as u64))),
     );
     let chosen = Chosen {
@@ -101,22 +96,62 @@ pub(super) fn propagate(
         efficiency: 1.0,
         written: true,
     };
+    let centre = inputs.middle.clone();
     let basis = Basis { centre, efficiency: 1.0, responses: Some(&held) };
     let made = work.predict(&basis, chosen)?;
     let bands = bands(&work, held, &points);
     let [response, quantities] = both.split(outputs);
-    let propagated = Propagated { inputs: names, samples, quantities, response, bands };
+    let bounds = bounds::bounds(&work, &inputs, samples, &stream);
+    if let Some(reason) = forward.failure() {
+        return Err(Stop::new(reason));
+    }
+    let inputs = inputs.names;
+    let propagated = Propagated { inputs, samples, quantities, response, bands, bounds };
     Ok(Quantified { propagated: Some(propagated), ..made })
+}
+
+/// Sensitivity of response and quantities, and the responses at the first points of the samples, as many as can be held. If
+/// no input has a distribution the response is one, and stands once for each draw of the errors.
+fn evaluated(
+    work: &Work<'_>,
+    inputs: &PropagatedInputs,
+    samples: usize,
+    stream: &Stream,
+) -> (Indices, Vec<Vec<f64>>) {
+    let outputs = work.forward.map_or(0, Forward::outputs);
+    let count = predict::affordable(samples, outputs);
+    if inputs.laws.is_empty() {
+        let points = Matrix::from_vec(1, inputs.middle.len(), inputs.middle.clone());
+        let alike = if work.errors.is_none() { 1 } else { count };
+        let response = work.responses(&points).swap_remove(0);
+        return (Indices::none(0), vec![response; alike]);
+    }
+    let mut held: Vec<Vec<f64>> = Vec::new();
+    let keep = |i: usize, values: &[f64]| {
+        if i < count {
+            held.push(values[..outputs].to_vec());
+        }
+    };
+    let everything = |points: &Matrix| work.everything(&inputs.full_rows(points));
+    let both = indices(&inputs.independent(), samples, stream, everything, keep);
+    (both, held)
 }
 
 /// States how many times the model itself will be run.
 pub(super) fn announcement(study: &Study, problem: &InverseProblem<'_>) -> Option<String> {
     matches!(problem.route, Route::Direct(_)).then_some(())?;
     let runs = runs(study)?;
-    Some(format!(
-        "the priors are propagated with {runs} runs of the model; `forward.draws` sets their number, and a `[surrogate]` \
-         needs fewer"
-    ))
+    Some(if study.intervals().is_empty() {
+        format!(
+            "the priors are propagated with {runs} runs of the model; `forward.draws` sets their number, and a `[surrogate]` \
+             needs fewer"
+        )
+    } else {
+        format!(
+            "priors and intervals are propagated with at most {runs} runs of the model; `forward.draws` and \
+             `forward.intervals` set their number, and a `[surrogate]` needs fewer"
+        )
+    })
 }
 
 impl Work<'_> {
@@ -156,7 +191,9 @@ fn bands(work: &Work<'_>, held: Vec<Vec<f64>>, points: &Matrix) -> Bands {
         let values: Vec<f64> = all.iter().map(|r| r[j]).filter(|y| y.is_finite()).collect();
         let ordered = sorted(&values);
         let [low, middle, high] = [0.025, 0.5, 0.975].map(|p| quantile(&ordered, p));
-        [mean(&values), variance(&values).sqrt(), low, middle, high]
+        // One value has no variance.
+        let square = if values.len() == 1 { 0.0 } else { variance(&values) };
+        [mean(&values), square.sqrt(), low, middle, high]
     };
     let found: Vec<[f64; 5]> = (0..outputs).into_par_iter().map(figures).collect();
     let [mean, sd, q025, median, q975] =

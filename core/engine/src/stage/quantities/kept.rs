@@ -9,7 +9,7 @@ use lacuna_run::Artifact;
 use lacuna_run::arrays::{self, Array};
 use serde::{Deserialize, Serialize};
 
-use super::{About, Bands, Propagated, Quantified};
+use super::{About, Bands, BoundsFindings, Propagated, Quantified};
 use crate::sensitivity::Indices;
 
 /// The description, and the figures of the quantities for people.
@@ -34,6 +34,8 @@ struct Written {
     inputs: Option<Vec<String>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     samples: Option<usize>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    bounds: Option<BoundsFindings>,
 }
 
 impl Artifact for Quantified {
@@ -43,6 +45,7 @@ impl Artifact for Quantified {
             about: self.about.clone(),
             inputs: propagated.map(|found| found.inputs.clone()),
             samples: propagated.map(|found| found.samples),
+            bounds: propagated.and_then(|found| found.bounds.clone()),
         };
         files::write_json(&folder.join(ABOUT), &written)?;
         let mut names = vec![ABOUT];
@@ -63,11 +66,12 @@ impl Artifact for Quantified {
 
     fn load(folder: &Path) -> Result<Self, Stop> {
         let path = folder.join(DRAWS);
-        let Written { about, inputs, samples } = files::read_json(&folder.join(ABOUT))?;
+        let Written { about, inputs, samples, bounds } = files::read_json(&folder.join(ABOUT))?;
         let asked = !about.quantities.is_empty();
         let propagated = match (inputs, samples) {
             (Some(inputs), Some(samples)) => {
-                Some(propagated(&folder.join(SENSITIVITY), inputs, samples, asked)?)
+                let found = propagated(&folder.join(SENSITIVITY), inputs, samples, asked)?;
+                Some(Propagated { bounds, ..found })
             }
             _ => None,
         };
@@ -92,11 +96,12 @@ fn vector(name: &str, dimension: &str, values: &[f64]) -> Array {
 /// All arrays of `sensitivity.nc`.
 fn all(found: &Propagated) -> Vec<Array> {
     let mut all = Vec::new();
+    let varies = !found.inputs.is_empty();
     if found.quantities.first.rows() > 0 {
         let own = INDICES.iter().zip(found.quantities.parts());
         all.extend(own.map(|(name, part)| Array::matrix(name, "quantity", "input", part)));
     }
-    for (name, part) in INDICES.iter().zip(found.response.parts()) {
+    for (name, part) in INDICES.iter().zip(found.response.parts()).filter(|_| varies) {
         all.push(Array::matrix(&format!("response_{name}"), "output", "input", part));
     }
     let bands = &found.bands;
@@ -128,7 +133,8 @@ fn propagated(
     let band = |k: usize| arrays::read(path, BANDS[k]).map(|array| array.values);
     let bands =
         Bands { mean: band(0)?, sd: band(1)?, q025: band(2)?, median: band(3)?, q975: band(4)? };
-    let quantities = if asked { read("")? } else { Indices::none(inputs.len()) };
-    let response = read("response_")?;
-    Ok(Propagated { inputs, samples, quantities, response, bands })
+    let none = || Indices::none(inputs.len());
+    let quantities = if asked && !inputs.is_empty() { read("")? } else { none() };
+    let response = if inputs.is_empty() { none() } else { read("response_")? };
+    Ok(Propagated { inputs, samples, quantities, response, bands, bounds: None })
 }

@@ -7,10 +7,13 @@
 //! cycles depend on that. Every quantity is evaluated with the errors that it includes, with none, and without each;
 //! all variants use the same draws, so that their differences are not those of random numbers.
 
+mod about;
+mod bounds;
 mod errors;
 mod findings;
 mod forward;
 mod given;
+mod inputs;
 mod kept;
 
 use lacuna::data::Draws;
@@ -22,9 +25,11 @@ use lacuna::run::{Observer, Progress, Stop};
 use lacuna_linalg::Matrix;
 use lacuna_run::{Kept, RunDirectory, Stage};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+pub use self::about::{About, Described, Variant};
+use self::about::{PARAMETERS, described, variants};
+pub use self::bounds::{Bounds, BoundsFindings, End, Interval, PROBABILITIES, Range};
 use self::errors::Errors;
 pub use self::findings::{InputShare, QuantityFindings};
 pub use self::forward::{Bands, Propagated, runs};
@@ -49,51 +54,6 @@ pub struct Quantified {
     /// Response under the priors and shares of the parameters, in a study without data.
     pub propagated: Option<Propagated>,
 }
-
-/// Description of predicted quantities.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct About {
-    /// The quantities.
-    pub quantities: Vec<Described>,
-    /// The variants, in the order of the draws.
-    pub variants: Vec<Variant>,
-    /// Indices of the chains of the draws.
-    pub chains: Vec<usize>,
-    /// Indices of the steps in each of these chains, counted after the burn-in.
-    pub steps: Vec<usize>,
-    /// Ratio of independent to all draws.
-    pub efficiency: f64,
-}
-
-/// Description of a predicted quantity.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Described {
-    /// Name with the labels of its curve and its scenario.
-    pub name: String,
-    /// Unit of all values.
-    pub unit: String,
-    /// Reference value, if the study gives one.
-    pub reference: Option<f64>,
-    /// Errors in the prediction, by origin.
-    pub includes: Vec<String>,
-    /// Errors that a new replicate has and the prediction does not contain, by origin.
-    pub leaves_out: Vec<String>,
-}
-
-/// Variant of a prediction, by the sources of uncertainty in it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Variant {
-    /// All sources that a quantity includes.
-    Total,
-    /// The posterior of the parameters alone.
-    Parameters,
-    /// All sources that a quantity includes but this one: `parameters`, or the origin of an error.
-    Without(String),
-}
-
-/// Source of uncertainty that is no error: the posterior of the parameters.
-const PARAMETERS: &str = "parameters";
 
 /// Predicts the quantities of a study with data from its posterior, and those of one without from its priors; `None` if
 /// it asks for none.
@@ -139,11 +99,14 @@ fn of_priors(
         problem.origin(),
         problem.numerics().map(|n| &n.hash),
         study.numerical_error.as_ref().map(|section| section.written.scales()),
-        forward::priors(study),
+        inputs::priors(study),
         study.effects_identity(),
         draws,
         asked_for(study),
     ]);
+    // A study without intervals has none of the search in its identity.
+    let search = bounds::identity(study);
+    let inputs = if search.is_null() { inputs } else { json!([inputs, search]) };
     predicted(study, &inputs, run, observer, |progress| {
         if let Some(text) = forward::announcement(study, problem) {
             observer.remark(&text);
@@ -199,6 +162,7 @@ fn predicted(
             found.name, found.undefined, found.draws
         ));
     }
+    bounds::warn(&kept.value, observer);
     let count = findings.len();
     let word = if count == 1 { "quantity" } else { "quantities" };
     observer.end(Stage::Quantities.label(), &format!("{count} {word}"));
@@ -359,30 +323,6 @@ impl<'a> Work<'a> {
             values.push(asked.value(response, (place.point, &place.derived, &values)));
         }
         values
-    }
-}
-
-/// Variants of a prediction with errors of these origins.
-fn variants(origins: &[String]) -> Vec<Variant> {
-    let mut all = vec![Variant::Total, Variant::Parameters];
-    if !origins.is_empty() {
-        all.push(Variant::Without(PARAMETERS.to_owned()));
-        all.extend(origins.iter().cloned().map(Variant::Without));
-    }
-    all
-}
-
-fn described(asked: &Asked, origins: &[String]) -> Described {
-    let own = |included: bool| -> Vec<String> {
-        let chosen = |origin: &&String| asked.of_curve && asked.includes(origin) == included;
-        origins.iter().filter(chosen).cloned().collect()
-    };
-    Described {
-        name: asked.name.clone(),
-        unit: asked.unit.to_string(),
-        reference: asked.reference,
-        includes: own(true),
-        leaves_out: own(false),
     }
 }
 

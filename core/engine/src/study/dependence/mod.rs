@@ -60,12 +60,14 @@ impl Sections {
         self.earlier = earlier::earlier(parameters, directory, root, problems);
     }
 
-    /// Prior of a parameter by itself; `None` if the study gives none.
+    /// Prior of a parameter by itself, of an interval the law of its design points; `None` if the study gives none.
     pub(super) fn prior(&self, section: &ParameterSection) -> Option<Distribution> {
         let name = section.name.as_str();
         match &section.prior {
             Some(Prior::Own(law)) => Some(law.clone()),
             Some(Prior::Earlier { .. }) => self.of_run(name),
+            // The law of the design points. Nothing else may draw from it.
+            Some(Prior::Interval { interval }) => Some(Distribution::Uniform(*interval)),
             None => self.prior_of_share(name),
         }
     }

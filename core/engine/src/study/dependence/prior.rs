@@ -1,4 +1,4 @@
-//! A prior as a study writes it: a distribution, or the posterior of an earlier run.
+//! A prior as a study writes it: a distribution, the posterior of an earlier run, or an interval without any distribution.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -21,6 +21,11 @@ pub enum Prior {
         /// posterior. Their names must be those of the run; units are converted.
         posterior: PathBuf,
     },
+    /// No distribution: a fixed value of which bounds are known and nothing else.
+    Interval {
+        /// Lower and upper bound, in the parameter's unit.
+        interval: [f64; 2],
+    },
 }
 
 impl<'de> Deserialize<'de> for Prior {
@@ -29,7 +34,7 @@ impl<'de> Deserialize<'de> for Prior {
     }
 }
 
-/// The forms of a distribution and one more, so that an editor names the fault of one form.
+/// The forms of a distribution and two more, so that an editor names the fault of one form.
 impl JsonSchema for Prior {
     fn schema_name() -> Cow<'static, str> {
         "Prior".into()
@@ -45,9 +50,19 @@ impl JsonSchema for Prior {
             "required": ["posterior"],
             "additionalProperties": false
         });
+        let interval = json_schema!({
+            "description": "No distribution: a fixed value between `[lower bound, upper bound]`, of which nothing else is known. \
+                            Quantities are then bounded over the interval; in a study without data only.",
+            "type": "object",
+            "properties": {
+                "interval": { "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }
+            },
+            "required": ["interval"],
+            "additionalProperties": false
+        });
         let object = schema.ensure_object();
         if let Some(forms) = object.get_mut("oneOf").and_then(serde_json::Value::as_array_mut) {
-            forms.push(earlier.to_value());
+            forms.extend([earlier.to_value(), interval.to_value()]);
         }
         schema
     }
@@ -68,15 +83,29 @@ impl<'de> Visitor<'de> for Written {
                 "expected a distribution such as { uniform = [0, 1] }, found an empty table",
             ));
         };
-        if name != "posterior" {
-            return Distribution::named(&name, map).map(Prior::Own);
-        }
-        let posterior = map.next_value()?;
+        let prior = match name.as_str() {
+            "posterior" => Prior::Earlier { posterior: map.next_value()? },
+            "interval" => Prior::Interval { interval: bounds(&map.next_value::<Vec<f64>>()?)? },
+            _ => return Distribution::named(&name, map).map(Prior::Own),
+        };
         match map.next_key::<String>()? {
             Some(second) => {
-                Err(Error::custom(format!("expected one prior, found `posterior` and `{second}`")))
+                Err(Error::custom(format!("expected one prior, found `{name}` and `{second}`")))
             }
-            None => Ok(Prior::Earlier { posterior }),
+            None => Ok(prior),
         }
     }
+}
+
+/// Bounds of an interval, checked.
+fn bounds<E: Error>(numbers: &[f64]) -> Result<[f64; 2], E> {
+    let expected = match *numbers {
+        [low, high] if !(low.is_finite() && high.is_finite()) => "finite numbers",
+        [low, high] if low >= high => "the lower bound below the upper",
+        [low, high] if !(high - low).is_finite() => "a narrower interval",
+        [low, high] => return Ok([low, high]),
+        _ => "`interval` to be [lower bound, upper bound]",
+    };
+    let found: Vec<String> = numbers.iter().map(f64::to_string).collect();
+    Err(Error::custom(format!("expected {expected}, found [{}]", found.join(", "))))
 }

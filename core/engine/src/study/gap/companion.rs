@@ -129,6 +129,13 @@ fn with_constants(
         _ => None,
     };
     let of_run = |c: &&ParameterSection| matches!(c.prior, Some(Prior::Earlier { .. }));
+    let bounded = |c: &&ParameterSection| matches!(c.prior, Some(Prior::Interval { .. }));
+    for constant in keys.parameter.iter().filter(bounded) {
+        Complaints::new(node, problems)
+            .at(&format!("parameter.{}.prior", constant.name))
+            .say("a constant of the companion is estimated, which an interval does not allow")
+            .expected("a distribution");
+    }
     for constant in keys.parameter.iter().filter(of_run) {
         Complaints::new(node, problems)
             .at(&format!("parameter.{}.prior", constant.name))

@@ -8,7 +8,7 @@ use lacuna::text::nearest::{nearest, one_of};
 use lacuna::text::{Complaints, Node, Problems};
 
 use super::{Member, PopulationKeys};
-use crate::study::file::ParameterSection;
+use crate::study::file::{ParameterSection, Prior};
 use crate::study::unknowns::Unknown;
 
 /// Number of draws from which the distribution of a member by itself is described.
@@ -45,6 +45,7 @@ pub(in crate::study) fn members(
             scenario: None,
             member: Some(member),
             of_population: false,
+            interval: matches!(section.prior, Some(Prior::Interval { .. })),
         });
     }
     let population = section.population.as_ref()?;
@@ -66,6 +67,7 @@ pub(in crate::study) fn members(
             scenario: None,
             member: None,
             of_population: true,
+            interval: false,
         });
     }
     let typical = population.unknowns()[1].1.quantile(0.5);
