@@ -101,8 +101,14 @@ fn a_strict_run_without_trust_ends_with_its_own_exit_code() {
 /// Every code of a finding has a test that provokes it with a study, here or elsewhere in this folder.
 #[test]
 fn every_finding_is_provoked_by_a_study() {
-    let elsewhere =
-        ["bad_input.rs", "studies.rs", "priors.rs", "predict.rs", "hierarchy/trained.rs"];
+    let elsewhere = [
+        "bad_input.rs",
+        "studies.rs",
+        "priors.rs",
+        "predict.rs",
+        "hierarchy/trained.rs",
+        "intervals.rs",
+    ];
     let here = ["assess/data.rs", "assess/draws.rs", "assess/runs.rs"];
     let read = |file: &&str| fs::read_to_string(quick::root().join("tests").join(file)).unwrap();
     let text: String = here.iter().chain(&elsewhere).map(read).collect();
