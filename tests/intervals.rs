@@ -125,6 +125,7 @@ fn a_shift_by_an_interval() {
     );
     let resolved = fs::read_to_string(folder.path().join("out/resolved.toml")).unwrap();
     assert!(resolved.contains("interval"), "{resolved}");
+    quick::load(&folder.path().join("out/resolved.toml"), &[]);
 }
 
 /// `y = c x`: the standard deviation has its bounds at the ends, and with zero in the interval its smallest value inside.

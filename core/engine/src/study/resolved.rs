@@ -116,7 +116,10 @@ pub(super) fn table(
         later.insert("reliability", rare?.into());
     }
     later.insert("validate", to_table(&study.validate)?.into());
-    later.insert("gap", gap(&study.gap)?.into());
+    // Without measurements there is no gap to search for, and the section would be refused.
+    if study.measurements.is_some() {
+        later.insert("gap", gap(&study.gap)?.into());
+    }
     for name in SECTIONS {
         whole.extend(later.remove(name).map(|section| ((*name).to_owned(), section)));
     }
