@@ -23,7 +23,7 @@ pub(super) fn table(
     let mut about = to_table(&study.about)?;
     about.insert("name".to_owned(), study.name.clone().into());
     let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
-    about.insert("directory".to_owned(), directory.display().to_string().into());
+    about.insert("directory".to_owned(), text(&directory));
     let first = |(j, (_, unknown)): &(usize, (&Parameter, &Unknown))| {
         let again = unknown.member.is_some()
             && study.unknowns[..*j].iter().any(|other| other.name == unknown.name);
@@ -52,12 +52,10 @@ pub(super) fn table(
             }
             if unknown.interval {
                 let (low, high) = parameter.prior.support();
-                let ends = ("interval".to_owned(), vec![low, high].into());
-                table.insert("prior".to_owned(), Table::from_iter([ends]).into());
+                table.insert("prior".to_owned(), only("interval", vec![low, high].into()));
             }
             if let Some(run) = study.dependence_sections.run_of(&parameter.name) {
-                let posterior = ("posterior".to_owned(), run.display().to_string().into());
-                table.insert("prior".to_owned(), Table::from_iter([posterior]).into());
+                table.insert("prior".to_owned(), only("posterior", text(run)));
             }
             Ok(table)
         })
@@ -116,7 +114,7 @@ pub(super) fn table(
         later.insert("reliability", rare?.into());
     }
     later.insert("validate", to_table(&study.validate)?.into());
-    // Without measurements there is no gap to search for, and the section would be refused.
+    // Without measurements the section would be refused.
     if study.measurements.is_some() {
         later.insert("gap", gap(&study.gap)?.into());
     }
@@ -124,6 +122,15 @@ pub(super) fn table(
         whole.extend(later.remove(name).map(|section| ((*name).to_owned(), section)));
     }
     Ok(whole)
+}
+
+fn text(path: &std::path::Path) -> Value {
+    path.display().to_string().into()
+}
+
+/// A table with one key.
+fn only(key: &str, value: Value) -> Value {
+    Table::from_iter([(key.to_owned(), value)]).into()
 }
 
 /// `[gap]` with its lists.
