@@ -9,6 +9,7 @@ mod campaign;
 mod commands;
 mod coverage;
 mod dependencies;
+mod direct;
 mod docs;
 mod effects;
 mod falling_balls;

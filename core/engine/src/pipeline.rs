@@ -122,7 +122,7 @@ pub fn power(
         let (emulated, _) = calibrate_emulated(study, run, observer)?;
         power::stage(study, design, simulations, &emulated.problem(), run, observer)?
     } else {
-        let direct = Direct::of(study, run, observer)?;
+        let direct = Direct::of(study, run, observer)?.fitted(study, run, observer)?;
         power::stage(study, design, simulations, &direct.problem(), run, observer)?
     };
     let page = run.stage_folder(&Stage::Power.folder()).join("power.html");
@@ -146,7 +146,7 @@ fn pursue(
             conclude(study, goal, &emulated.problem(), calibrated.as_ref(), run, observer)?
         }
         (None, None) => {
-            let direct = Direct::of(study, run, observer)?;
+            let direct = Direct::of(study, run, observer)?.fitted(study, run, observer)?;
             let calibrated = calibrate_direct(study, &direct, run, observer)?;
             conclude(study, goal, &direct.problem(), calibrated.as_ref(), run, observer)?
         }

@@ -2,19 +2,10 @@
 
 use lacuna_plugins::models::mercury_target::{Cells, Mercury, Outcome, Sampling, Settings, Target};
 
-/// Gauges with the standard deviation of their noise in microstrain, as in `configs/sns`.
-pub const SENSORS: [(&str, f64); 10] = [
-    ("B", 16.0),
-    ("C", 26.0),
-    ("G", 7.0),
-    ("M", 6.0),
-    ("R", 14.0),
-    ("T", 15.0),
-    ("U", 28.0),
-    ("V", 13.0),
-    ("Y", 14.0),
-    ("Z", 12.0),
-];
+#[path = "../../../examples/gauges.rs"]
+mod gauges;
+
+pub use gauges::GAUGES as SENSORS;
 
 /// The hoop gauges of the cylinder with their distances from the apex of the cap, m.
 pub const HOOP: [(&str, f64); 6] =

@@ -87,9 +87,11 @@ impl<'a> Ground<'a> {
             )
             .help("count the coverage of a copy of the study with a design that does not follow the data"));
         }
-        let base = match study.surrogate {
-            Some(_) => Base::Emulated(vec![emulate(study, run, observer)?]),
-            None => Base::Direct(direct::Direct::of(study, run, observer)?),
+        let base = if study.surrogate.is_some() {
+            Base::Emulated(vec![emulate(study, run, observer)?])
+        } else {
+            let direct = direct::Direct::of(study, run, observer)?;
+            Base::Direct(direct.fitted(study, run, observer)?)
         };
         let data = base.problem(0).data.clone();
         let measured = data.value.measured.as_ref();

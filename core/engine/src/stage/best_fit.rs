@@ -1,11 +1,16 @@
 //! Least-squares best fit of the model, before any discrepancy is chosen, and the derivatives of the response there.
 
+use std::path::Path;
+
 use lacuna::data::{JointPrior, Measurements, Observations, Parameter};
 use lacuna::math::random::Stream;
 use lacuna::plugin::Forward;
 use lacuna::plugin::discrepancy::{Hyperparameter, Likelihood, VariancePart};
-use lacuna::run::Stop;
+use lacuna::run::{Observer, Stop, files};
 use lacuna_linalg::Matrix;
+use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::start::maxima;
 use super::stream;
@@ -21,6 +26,56 @@ pub struct Fit<'a> {
     pub forward: &'a dyn Forward,
     /// Parameters of the best fit.
     pub point: &'a [f64],
+}
+
+/// A best fit with the response there.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BestFit {
+    /// Parameters of the best fit.
+    pub point: Vec<f64>,
+    /// Response; `None` if the model has none there.
+    pub response: Option<Vec<f64>>,
+}
+
+const FIT: &str = "fit.json";
+
+impl Artifact for BestFit {
+    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
+        files::write_json(&folder.join(FIT), self)?;
+        Ok(vec![FIT.to_owned()])
+    }
+
+    fn load(folder: &Path) -> Result<Self, Stop> {
+        files::read_json(&folder.join(FIT))
+    }
+}
+
+/// The best fit to some data, as [`point`] finds it.
+pub fn fitted(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<BestFit, Stop> {
+    let found = point(study, data, forward);
+    if let Some(reason) = forward.failure() {
+        return Err(Stop::new(reason));
+    }
+    let point = found?;
+    let there = forward.mean(&Matrix::from_vec(1, point.len(), point.clone())).into_vec();
+    let is_finite = there.iter().all(|y| y.is_finite());
+    Ok(BestFit { point, response: is_finite.then_some(there) })
+}
+
+/// The best fit of a study whose model takes the place of an emulator: it is kept, because it takes runs of the model.
+pub fn stage(
+    study: &Study,
+    (data, forward): (&Observations, &dyn Forward),
+    inputs: &Value,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Kept<BestFit>, Stop> {
+    let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior)).collect();
+    let inputs =
+        json!([inputs, study.prior_identity(json!(laws)), &study.starts, study.about.seed]);
+    run.keep(&Stage::Calibrate.part("best-fit"), &inputs, observer, |_| {
+        fitted(study, data, forward)
+    })
 }
 
 /// Parameters that maximise prior times `|y - m|^-N`: the normal likelihood of independent data with its unknown

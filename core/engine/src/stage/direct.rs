@@ -13,16 +13,20 @@ use lacuna_run::{Kept, RunDirectory};
 use rayon::prelude::*;
 use serde_json::json;
 
+use super::best_fit::BestFit;
 use super::inverse_problem::Route;
 use super::read;
 use super::read::Data;
 use super::simulator::{Setting, Simulator};
+use super::{best_fit, replicate_error};
 use crate::stage::inverse_problem::InverseProblem;
 use crate::study::Study;
 
 /// Measurements and model, which are all that precedes the posterior.
 pub struct Direct<'a> {
     data: Kept<Data>,
+    /// Best fit to the data, if it was needed.
+    best_fit: Option<Kept<BestFit>>,
     /// The model as the forward map.
     pub forward: ModelMap<'a>,
     /// Hash of everything the forward map depends on.
@@ -41,12 +45,31 @@ impl<'a> Direct<'a> {
         let model = study.model.as_ref().map(|m| (m.built.identity(), &m.common));
         let sources = files::hash_sources(&forward.simulator.model.files(&study.directory))?;
         let origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
-        Ok(Self { data, forward, origin: files::hash(origin.to_string().as_bytes()) })
+        let origin = files::hash(origin.to_string().as_bytes());
+        Ok(Self { data, best_fit: None, forward, origin })
+    }
+
+    /// The same with the best fit to the data, if the error of the replicates' mean needs it.
+    pub fn fitted(
+        mut self,
+        study: &Study,
+        run: &mut RunDirectory,
+        observer: &dyn Observer,
+    ) -> Result<Self, Stop> {
+        if let Some(measured) = &self.data.value.measured
+            && replicate_error::needs_best_fit(study, measured)
+        {
+            let inputs = json!([self.data.hash, self.origin]);
+            let to = (&measured.likelihood, &self.forward as &dyn Forward);
+            self.best_fit = Some(best_fit::stage(study, to, &inputs, run, observer)?);
+        }
+        Ok(self)
     }
 
     /// The data with the model as the forward map.
     pub fn problem(&self) -> InverseProblem<'_> {
-        InverseProblem::new(&self.data, Route::Direct(self), None)
+        let known = self.best_fit.as_ref().map(|kept| &kept.value);
+        InverseProblem::new(&self.data, Route::Direct(self), None).with_best_fit(known)
     }
 
     /// Summary of the model's evaluations; see [`ModelMap::tally`].

@@ -6,10 +6,9 @@ use lacuna::data::Observations;
 use lacuna::math::random::Stream;
 use lacuna::plugin::{Emulator, Forward};
 use lacuna::run::Stop;
-use lacuna_linalg::Matrix;
 use lacuna_run::Kept;
 
-use super::best_fit::{self, Fit};
+use super::best_fit::{self, BestFit, Fit};
 use super::common_error::Allowance;
 use super::direct::Direct;
 use super::emulated::Emulated;
@@ -41,7 +40,7 @@ pub struct InverseProblem<'a> {
     /// Errors of emulator and numerics for these data, computed on first use.
     allowances: OnceLock<Vec<Allowance>>,
     /// Least-squares best fit to these data, computed on first use.
-    best_fit: OnceLock<Vec<f64>>,
+    best_fit: OnceLock<BestFit>,
 }
 
 impl<'a> InverseProblem<'a> {
@@ -99,24 +98,19 @@ impl<'a> InverseProblem<'a> {
         self.emulated()?.refinement.as_ref()
     }
 
+    /// The same problem with a best fit that is known.
+    pub fn with_best_fit(self, known: Option<&BestFit>) -> Self {
+        let best_fit = known.map_or_else(OnceLock::new, |fitted| OnceLock::from(fitted.clone()));
+        Self { best_fit, ..self }
+    }
+
     /// Least-squares best fit to these data.
-    fn best_fit(&self, study: &Study, data: &Observations) -> Result<&[f64], Stop> {
+    pub(super) fn best_fit(&self, study: &Study, data: &Observations) -> Result<&BestFit, Stop> {
         if let Some(found) = self.best_fit.get() {
             return Ok(found);
         }
-        let found = best_fit::point(study, data, self.forward())?;
+        let found = best_fit::fitted(study, data, self.forward())?;
         Ok(self.best_fit.get_or_init(|| found))
-    }
-
-    /// Response at the least-squares best fit to these data.
-    pub(super) fn fitted_response(
-        &self,
-        study: &Study,
-        data: &Observations,
-    ) -> Result<Vec<f64>, Stop> {
-        let best = self.best_fit(study, data)?;
-        let point = Matrix::from_vec(1, best.len(), best.to_vec());
-        Ok(self.forward().mean(&point).into_vec())
     }
 
     /// Errors of emulator and numerics that the study's likelihood includes, for these data.
@@ -135,7 +129,7 @@ impl<'a> InverseProblem<'a> {
             found.push(emulator_error::allowance(
                 study,
                 &fitted.value,
-                Fit { data, forward, point: best },
+                Fit { data, forward, point: &best.point },
             )?);
         }
         if let (Some(kept), Some(section)) = (self.numerics(), &study.numerical_error) {
@@ -143,7 +137,7 @@ impl<'a> InverseProblem<'a> {
             found.push(kept.value.allowance(
                 study,
                 &section.written,
-                Fit { data, forward, point: best },
+                Fit { data, forward, point: &best.point },
             )?);
         }
         Ok(self.allowances.get_or_init(|| found))

@@ -25,8 +25,8 @@ pub struct Law<'a> {
     forward: &'a dyn Forward,
     plugin: &'a dyn Discrepancy,
     common: Vec<CommonError>,
-    /// Response at the best fit, if the study includes the error of the replicates.
-    fitted: Vec<f64>,
+    /// Response at the best fit, if the error of the replicates' mean needs it.
+    fitted: Option<Vec<f64>>,
     slopes: OnceLock<Result<Matrix, Stop>>,
 }
 
@@ -60,9 +60,10 @@ impl<'a> Law<'a> {
         let errors = problem.allowances(study, &section.common, &measured.likelihood)?;
         let common = errors.iter().map(|error| size(error).clone()).collect();
         let replicates = section.common.replicate_error.then_some(&measured.used);
-        let fitted = match replicates {
-            Some(_) => problem.fitted_response(study, &measured.likelihood)?,
-            None => Vec::new(),
+        let fitted = if replicate_error::needs_best_fit(study, measured) {
+            problem.best_fit(study, &measured.likelihood)?.response.clone()
+        } else {
+            None
         };
         Ok(Self {
             replicates,
@@ -87,7 +88,7 @@ impl<'a> Law<'a> {
             forward,
             plugin: &*section.built.plugin,
             common: Vec::new(),
-            fitted: Vec::new(),
+            fitted: None,
             slopes: OnceLock::new(),
         })
     }
@@ -127,7 +128,7 @@ impl<'a> Law<'a> {
         // A stated covariance already contains the correlation within a replicate.
         let shared = |replicates: &&Observations| replicates.blocks[i].covariance.is_none();
         if let Some(replicates) = self.replicates.filter(shared) {
-            let fitted = &self.fitted[range.clone()];
+            let fitted = self.fitted.as_ref().map(|all| &all[range.clone()]);
             let of_replicates = replicate_error::of_replicates(&replicates.blocks[i], fitted);
             let after = usize::from(own.first().is_some_and(|e| e.origin == ErrorOrigin::Emulator));
             own.splice(after..after, of_replicates);

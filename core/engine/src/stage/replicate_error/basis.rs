@@ -39,21 +39,32 @@ impl Curve {
     }
 }
 
-/// Curves with enough points, one for each combination of labels.
-pub(super) fn curves(layout: &Layout, response: &[f64], summaries: &[Summary]) -> Vec<Curve> {
-    if layout.abscissa().is_none() || response.iter().any(|y| !y.is_finite()) {
+/// Outputs with at least two values of each curve with enough of them, one curve for each combination of labels.
+fn measured(layout: &Layout, summaries: &[Summary]) -> Vec<Vec<usize>> {
+    if layout.abscissa().is_none() {
         return Vec::new();
     }
+    let twice = |indices: Vec<usize>| -> Vec<usize> {
+        indices.into_iter().filter(|&i| summaries[i].count >= 2).collect()
+    };
+    let all = layout.groups().into_iter().map(|group| twice(group.indices));
+    all.filter(|outputs| outputs.len() >= POINTS).collect()
+}
+
+/// Returns true if there are curves with enough points.
+pub(super) fn has_curves(layout: &Layout, summaries: &[Summary]) -> bool {
+    !measured(layout, summaries).is_empty()
+}
+
+/// The curves with enough points, with a response that is finite.
+pub(super) fn curves(layout: &Layout, response: &[f64], summaries: &[Summary]) -> Vec<Curve> {
     let slope = derivative(layout, response);
-    let curve = |indices: Vec<usize>| {
-        let outputs: Vec<usize> =
-            indices.into_iter().filter(|&i| summaries[i].count >= 2).collect();
+    let curve = |outputs: Vec<usize>| {
         let of = |all: &[f64]| outputs.iter().map(|&i| all[i]).collect::<Vec<f64>>();
         let functions = [of(response), of(&slope), vec![1.0; outputs.len()]];
         Curve { functions: independent(functions), outputs }
     };
-    let all = layout.groups().into_iter().map(|group| curve(group.indices));
-    all.filter(|curve| curve.outputs.len() >= POINTS).collect()
+    measured(layout, summaries).into_iter().map(curve).collect()
 }
 
 /// Keeps the functions that those before them do not explain.

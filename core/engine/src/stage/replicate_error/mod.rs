@@ -26,18 +26,36 @@ use lacuna_linalg::Matrix;
 
 use self::basis::{Curve, KINDS};
 use self::components::{Components, Fits};
+use super::read::Measured;
+use crate::study::Study;
 
-/// Error of the mean curve of the replicates, with the response at the best fit; `None` with fewer than three replicates.
-pub fn of_replicates(data: &Measurements, response: &[f64]) -> Option<CommonError> {
+/// Least number of replicates whose scatter shows what their points share.
+const FEWEST: usize = 3;
+
+/// Returns true if a study includes the error of the replicates' mean and has curves long enough to tell gain, timing and
+/// offset.
+pub fn needs_best_fit(study: &Study, measured: &Measured) -> bool {
+    let included = study.discrepancy.as_ref().is_some_and(|d| d.common.replicate_error);
+    let has_curves = |data: &Measurements| {
+        let replicates = data.replicates.iter().filter(|r| r.values.iter().any(Option::is_some));
+        let enough = data.covariance.is_none() && replicates.count() >= FEWEST;
+        enough && basis::has_curves(&data.layout, &data.summaries())
+    };
+    included && measured.used.blocks.iter().any(has_curves)
+}
+
+/// Error of the mean curve of the replicates, with the response at the best fit if it is known; `None` with fewer than three
+/// replicates.
+pub fn of_replicates(data: &Measurements, response: Option<&[f64]>) -> Option<CommonError> {
     let summaries = data.summaries();
     let used: Vec<&Replicate> =
         data.replicates.iter().filter(|r| r.values.iter().any(Option::is_some)).collect();
-    if used.len() < 3 {
+    if used.len() < FEWEST {
         return None;
     }
     let mut rest: Vec<Vec<Option<f64>>> =
         used.iter().map(|replicate| deviations(replicate, &summaries)).collect();
-    let curves = basis::curves(&data.layout, response, &summaries);
+    let curves = response.map_or_else(Vec::new, |y| basis::curves(&data.layout, y, &summaries));
     let fits = Fits::of(&curves, &mut rest);
     let mut columns = Vec::new();
     for kind in 0..KINDS {

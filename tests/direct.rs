@@ -1,0 +1,93 @@
+//! A study whose model is called directly, with replicates: what the error of their mean costs in runs of the model.
+
+use std::fs;
+use std::path::Path;
+
+use crate::quick;
+
+const STUDY: &str = r#"
+[study]
+name = "direct"
+title = "A line through the origin"
+seed = 3
+
+[[parameter]]
+name = "slope"
+prior = { uniform = [0.0, 2.0] }
+
+[response]
+name = "y"
+axes = { time = { first = 1, last = 8, count = 8, unit = "s" } }
+
+[model]
+use = "python"
+file = "line.py"
+function = "line"
+
+[measurements]
+use = "csv"
+path = "y.csv"
+
+[discrepancy]
+use = "gaussian"
+variance = { known = 0.01 }
+
+[sampler]
+use = "affine_invariant_ensemble"
+walkers = 8
+steps = 60
+
+[validate]
+rerun_model = false
+"#;
+
+/// The model notes each of its calls in a file.
+const MODEL: &str = r#"
+import pathlib
+
+
+def line(slope):
+    with (pathlib.Path(__file__).parent / "calls").open("a") as calls:
+        calls.write("x")
+    return [slope * time for time in range(1, 9)]
+"#;
+
+fn calls(folder: &Path) -> u64 {
+    fs::metadata(folder.join("calls")).unwrap().len()
+}
+
+/// The least-squares best fit is `sum t y / sum t^2`; it is kept, so that the study is run again without a call of the model.
+#[test]
+fn the_best_fit_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("study.toml"), STUDY).unwrap();
+    fs::write(folder.path().join("line.py"), MODEL).unwrap();
+    let mut table = "replicate,time [s],y\n".to_owned();
+    let (mut product, mut squares) = (0.0, 0.0);
+    for (replicate, gain) in [0.9, 1.0, 1.15].into_iter().enumerate() {
+        for time in 1..=8 {
+            let (t, wobble) = (f64::from(time), 0.1 * f64::from((time * 7 + 3) % 5 - 2));
+            let y = gain * t + wobble;
+            table.push_str(&format!("{replicate},{t},{y}\n"));
+            product += t * y;
+            squares += t * t;
+        }
+    }
+    fs::write(folder.path().join("y.csv"), table).unwrap();
+    let (study, out) = (folder.path().join("study.toml"), folder.path().join("out"));
+    quick::run(&study, &[], &out).unwrap_or_else(|stop| panic!("{stop}"));
+    let first = calls(folder.path());
+    let fit = fs::read_to_string(out.join("5-calibrate-best-fit/fit.json")).unwrap();
+    let fit: serde_json::Value = serde_json::from_str(&fit).unwrap();
+    let slope = fit["point"][0].as_f64().unwrap();
+    assert!((slope - product / squares).abs() < 1e-5, "{slope} {}", product / squares);
+    let again = quick::run(&study, &[], &out).unwrap_or_else(|stop| panic!("{stop}"));
+    assert_eq!((again.made, calls(folder.path())), (Vec::<String>::new(), first));
+    // Without the error of the replicates' mean there is no search for it.
+    let settings = ["discrepancy.replicate_error=false"];
+    let other = folder.path().join("other");
+    quick::run(&study, &settings, &other).unwrap_or_else(|stop| panic!("{stop}"));
+    assert!(!other.join("5-calibrate-best-fit").exists());
+    let search = 2 * first - calls(folder.path());
+    assert!(search < 1500, "the search takes {search} runs of the model");
+}
