@@ -1,19 +1,22 @@
 //! Route without a surrogate: the model itself is the forward map.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Forward;
 use lacuna::plugin::model::{Call, EvalError, Gradient, Response};
 use lacuna::run::{Observer, Stop, files};
 use lacuna_linalg::Matrix;
-use lacuna_run::{Kept, RunDirectory};
+use lacuna_run::{Kept, RunDirectory, Stage};
 use rayon::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::best_fit::BestFit;
+use super::calls::Calls;
 use super::inverse_problem::Route;
 use super::read;
 use super::read::Data;
@@ -41,9 +44,12 @@ impl<'a> Direct<'a> {
         observer: &dyn Observer,
     ) -> Result<Self, Stop> {
         let data = read::stage(study, None, run, observer)?;
-        let forward = ModelMap::of(study)?;
+        let mut forward = ModelMap::of(study)?;
         let model = study.model.as_ref().map(|m| (m.built.identity(), &m.common));
         let sources = files::hash_sources(&forward.simulator.model.files(&study.directory))?;
+        let units: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.unit)).collect();
+        let made_from = json!([model, study.scenarios, study.layouts, units, sources]);
+        forward.calls = Some(Calls::open(calls_file(run, &made_from)?));
         let origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
         let origin = files::hash(origin.to_string().as_bytes());
         Ok(Self { data, best_fit: None, forward, origin })
@@ -78,6 +84,13 @@ impl<'a> Direct<'a> {
     }
 }
 
+/// File of the slow evaluations of a model with these inputs.
+fn calls_file(run: &RunDirectory, made_from: &Value) -> Result<PathBuf, Stop> {
+    let folder = Stage::Simulate.part("calls");
+    let hash = run.hash_of(&folder, made_from)?;
+    Ok(run.stage_folder(&folder).join(format!("{}.jsonl", &hash[..12])))
+}
+
 /// The model of a study as its forward map.
 ///
 /// A failed evaluation gives a row of NaN, and is counted with its reason. Derivatives are the model's own if it has
@@ -88,6 +101,8 @@ pub struct ModelMap<'a> {
     outputs: usize,
     evaluations: AtomicU64,
     failures: Mutex<Failures>,
+    /// Slow evaluations that are kept.
+    calls: Option<Calls>,
 }
 
 #[derive(Default)]
@@ -113,7 +128,7 @@ impl<'a> ModelMap<'a> {
     /// A simulator as the forward map of its unknowns, which have these priors.
     pub fn with(simulator: Simulator<'a>, priors: Vec<Distribution>, outputs: usize) -> Self {
         let (evaluations, failures) = (AtomicU64::new(0), Mutex::default());
-        Self { simulator, priors, outputs, evaluations, failures }
+        Self { simulator, priors, outputs, evaluations, failures, calls: None }
     }
 
     /// Number of evaluations and of failures of the model, with the most frequent reasons.
@@ -151,25 +166,48 @@ impl<'a> ModelMap<'a> {
         None
     }
 
-    /// Responses to one scenario at some rows of `points`.
-    fn some(
-        &self,
-        setting: &Setting<'_>,
-        points: &Matrix,
-        rows: &[usize],
-    ) -> Vec<Option<Vec<f64>>> {
-        if self.failure().is_some() {
+    /// Responses to one scenario at some rows of `points`; those that are kept are not computed again.
+    fn some(&self, place: usize, points: &Matrix, rows: &[usize]) -> Vec<Option<Vec<f64>>> {
+        let known = |&i: &usize| self.calls.as_ref()?.response(place, points.row(i));
+        let mut answers: Vec<Option<Vec<f64>>> = rows.iter().map(known).collect();
+        let missing: Vec<usize> = (0..rows.len()).filter(|&k| answers[k].is_none()).collect();
+        let asked: Vec<usize> = missing.iter().map(|&k| rows[k]).collect();
+        for (k, answer) in missing.into_iter().zip(self.computed(place, points, &asked)) {
+            answers[k] = answer;
+        }
+        answers
+    }
+
+    fn computed(&self, place: usize, points: &Matrix, rows: &[usize]) -> Vec<Option<Vec<f64>>> {
+        if rows.is_empty() || self.failure().is_some() {
             return vec![None; rows.len()];
         }
+        let setting = &self.simulator.settings[place];
         let inputs: Vec<Vec<f64>> = rows.iter().map(|&i| setting.inputs(points.row(i))).collect();
         let calls: Vec<Call<'_>> =
             inputs.iter().map(|inputs| self.simulator.call(setting, inputs)).collect();
+        let begun = Instant::now();
         let mut responses = self.simulator.model.predict_batch(&calls).into_iter();
+        let taken = begun.elapsed() / rows.len() as u32;
         let missing = || {
             Err(EvalError::Fatal("the model returned fewer responses than requested".to_owned()))
         };
-        let mut next = || responses.next().unwrap_or_else(missing);
-        rows.iter().map(|_| self.note(setting.checked(next())).map(|r| r.values)).collect()
+        let one = |&row: &usize| {
+            let answer = self.note(setting.checked(responses.next().unwrap_or_else(missing)))?;
+            self.keep(place, points.row(row), &answer.values, taken);
+            Some(answer.values)
+        };
+        rows.iter().map(one).collect()
+    }
+
+    /// Keeps a response if it was slow; no more responses are computed if that fails.
+    fn keep(&self, place: usize, point: &[f64], response: &[f64], taken: Duration) {
+        let Some(calls) = &self.calls else { return };
+        if let Err(stop) = calls.note(place, point, response, taken)
+            && let Ok(mut failures) = self.failures.lock()
+        {
+            failures.fatal.get_or_insert(stop.to_string());
+        }
     }
 
     /// Response to one scenario with its derivatives.
@@ -227,21 +265,19 @@ impl Forward for ModelMap<'_> {
     fn mean(&self, points: &Matrix) -> Matrix {
         let size = self.simulator.model.batch().max(1);
         let rows: Vec<usize> = (0..points.rows()).collect();
-        let tasks: Vec<(&Setting<'_>, &[usize])> = self
-            .simulator
-            .settings
-            .iter()
-            .flat_map(|setting| rows.chunks(size).map(move |some| (setting, some)))
+        let settings = &self.simulator.settings;
+        let tasks: Vec<(usize, &[usize])> = (0..settings.len())
+            .flat_map(|place| rows.chunks(size).map(move |some| (place, some)))
             .collect();
         let answers: Vec<Vec<Option<Vec<f64>>>> =
-            tasks.par_iter().map(|(setting, some)| self.some(setting, points, some)).collect();
+            tasks.par_iter().map(|&(place, some)| self.some(place, points, some)).collect();
         let mut all = Matrix::zeros(points.rows(), self.outputs);
-        for ((setting, some), answers) in tasks.iter().zip(answers) {
+        for (&(place, some), answers) in tasks.iter().zip(answers) {
             for (&row, answer) in some.iter().zip(answers) {
-                let place = &mut all.row_mut(row)[setting.outputs.clone()];
+                let outputs = &mut all.row_mut(row)[settings[place].outputs.clone()];
                 match answer {
-                    Some(values) => place.copy_from_slice(&values),
-                    None => place.fill(f64::NAN),
+                    Some(values) => outputs.copy_from_slice(&values),
+                    None => outputs.fill(f64::NAN),
                 }
             }
         }
