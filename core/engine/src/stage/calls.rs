@@ -22,7 +22,7 @@ pub struct Calls {
 
 #[derive(Default)]
 struct Known {
-    /// Response by scenario and bits of the point.
+    /// Response by scenario and bits of the inputs.
     responses: BTreeMap<(usize, Vec<u64>), Vec<f64>>,
     /// The file, once something was written.
     file: Option<File>,
@@ -33,13 +33,13 @@ struct Known {
 struct Line {
     /// Number of the scenario.
     scenario: usize,
-    /// Parameters in their units.
-    point: Vec<f64>,
+    /// Inputs of the model in its units.
+    inputs: Vec<f64>,
     response: Vec<f64>,
 }
 
-fn key(scenario: usize, point: &[f64]) -> (usize, Vec<u64>) {
-    (scenario, point.iter().map(|x| x.to_bits()).collect())
+fn key(scenario: usize, inputs: &[f64]) -> (usize, Vec<u64>) {
+    (scenario, inputs.iter().map(|x| x.to_bits()).collect())
 }
 
 impl Calls {
@@ -49,14 +49,14 @@ impl Calls {
         let lines = text.split(|byte| *byte == b'\n');
         let responses = lines
             .filter_map(|line| serde_json::from_slice::<Line>(line).ok())
-            .map(|line| (key(line.scenario, &line.point), line.response))
+            .map(|line| (key(line.scenario, &line.inputs), line.response))
             .collect();
         Self { path, known: Mutex::new(Known { responses, file: None }) }
     }
 
-    /// The response to a scenario at a point, if it is known.
-    pub fn response(&self, scenario: usize, point: &[f64]) -> Option<Vec<f64>> {
-        self.known.lock().ok()?.responses.get(&key(scenario, point)).cloned()
+    /// The response to a scenario for some inputs, if it is known.
+    pub fn response(&self, scenario: usize, inputs: &[f64]) -> Option<Vec<f64>> {
+        self.known.lock().ok()?.responses.get(&key(scenario, inputs)).cloned()
     }
 
     /// Keeps a response that took this time.
@@ -66,7 +66,7 @@ impl Calls {
     pub fn note(
         &self,
         scenario: usize,
-        point: &[f64],
+        inputs: &[f64],
         response: &[f64],
         taken: Duration,
     ) -> Result<(), Stop> {
@@ -74,7 +74,7 @@ impl Calls {
         if taken < SLOW {
             return Ok(());
         }
-        let line = Line { scenario, point: point.to_vec(), response: response.to_vec() };
+        let line = Line { scenario, inputs: inputs.to_vec(), response: response.to_vec() };
         let text = serde_json::to_string(&line)
             .map_err(|error| Stop::new(format!("cannot note a response: {error}")))?;
         let failed = |error: std::io::Error| files::cannot_write(&self.path, &error);
@@ -83,7 +83,7 @@ impl Calls {
             none => none.insert(self.created().map_err(failed)?),
         };
         writeln!(file, "{text}").map_err(failed)?;
-        known.responses.insert(key(scenario, point), line.response);
+        known.responses.insert(key(scenario, inputs), line.response);
         Ok(())
     }
 

@@ -47,8 +47,7 @@ impl<'a> Direct<'a> {
         let mut forward = ModelMap::of(study)?;
         let model = study.model.as_ref().map(|m| (m.built.identity(), &m.common));
         let sources = files::hash_sources(&forward.simulator.model.files(&study.directory))?;
-        let units: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.unit)).collect();
-        let made_from = json!([model, study.scenarios, study.layouts, units, sources]);
+        let made_from = json!([model, study.scenarios, study.layouts, sources]);
         forward.calls = Some(Calls::open(calls_file(run, &made_from)?));
         let origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
         let origin = files::hash(origin.to_string().as_bytes());
@@ -168,42 +167,44 @@ impl<'a> ModelMap<'a> {
 
     /// Responses to one scenario at some rows of `points`; those that are kept are not computed again.
     fn some(&self, place: usize, points: &Matrix, rows: &[usize]) -> Vec<Option<Vec<f64>>> {
-        let known = |&i: &usize| self.calls.as_ref()?.response(place, points.row(i));
-        let mut answers: Vec<Option<Vec<f64>>> = rows.iter().map(known).collect();
+        let setting = &self.simulator.settings[place];
+        let inputs: Vec<Vec<f64>> = rows.iter().map(|&i| setting.inputs(points.row(i))).collect();
+        let known = |inputs: &Vec<f64>| self.calls.as_ref()?.response(place, inputs);
+        let mut answers: Vec<Option<Vec<f64>>> = inputs.iter().map(known).collect();
         let missing: Vec<usize> = (0..rows.len()).filter(|&k| answers[k].is_none()).collect();
-        let asked: Vec<usize> = missing.iter().map(|&k| rows[k]).collect();
-        for (k, answer) in missing.into_iter().zip(self.computed(place, points, &asked)) {
+        let asked: Vec<&Vec<f64>> = missing.iter().map(|&k| &inputs[k]).collect();
+        for (k, answer) in missing.into_iter().zip(self.computed(place, &asked)) {
             answers[k] = answer;
         }
         answers
     }
 
-    fn computed(&self, place: usize, points: &Matrix, rows: &[usize]) -> Vec<Option<Vec<f64>>> {
-        if rows.is_empty() || self.failure().is_some() {
-            return vec![None; rows.len()];
+    /// Responses to one scenario for some inputs of the model.
+    fn computed(&self, place: usize, inputs: &[&Vec<f64>]) -> Vec<Option<Vec<f64>>> {
+        if inputs.is_empty() || self.failure().is_some() {
+            return vec![None; inputs.len()];
         }
         let setting = &self.simulator.settings[place];
-        let inputs: Vec<Vec<f64>> = rows.iter().map(|&i| setting.inputs(points.row(i))).collect();
         let calls: Vec<Call<'_>> =
             inputs.iter().map(|inputs| self.simulator.call(setting, inputs)).collect();
         let begun = Instant::now();
         let mut responses = self.simulator.model.predict_batch(&calls).into_iter();
-        let taken = begun.elapsed() / rows.len() as u32;
+        let taken = begun.elapsed() / inputs.len() as u32;
         let missing = || {
             Err(EvalError::Fatal("the model returned fewer responses than requested".to_owned()))
         };
-        let one = |&row: &usize| {
+        let one = |inputs: &&Vec<f64>| {
             let answer = self.note(setting.checked(responses.next().unwrap_or_else(missing)))?;
-            self.keep(place, points.row(row), &answer.values, taken);
+            self.keep(place, inputs, &answer.values, taken);
             Some(answer.values)
         };
-        rows.iter().map(one).collect()
+        inputs.iter().map(one).collect()
     }
 
     /// Keeps a response if it was slow; no more responses are computed if that fails.
-    fn keep(&self, place: usize, point: &[f64], response: &[f64], taken: Duration) {
+    fn keep(&self, place: usize, inputs: &[f64], response: &[f64], taken: Duration) {
         let Some(calls) = &self.calls else { return };
-        if let Err(stop) = calls.note(place, point, response, taken)
+        if let Err(stop) = calls.note(place, inputs, response, taken)
             && let Ok(mut failures) = self.failures.lock()
         {
             failures.fatal.get_or_insert(stop.to_string());
