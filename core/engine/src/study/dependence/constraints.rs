@@ -49,7 +49,7 @@ fn compiled(
 ) -> Result<(Program, Vec<usize>), Vec<Fault>> {
     let mut scope = Scope::new();
     let (mut units, mut places) = (BTreeMap::<String, Unit>::new(), Vec::new());
-    for (j, unknown) in unknowns.iter().enumerate().filter(|(_, u)| u.is_shared()) {
+    for (j, unknown) in unknowns.iter().enumerate().filter(|(_, u)| u.is_shared() && !u.of_field) {
         scope.unknown(&unknown.name).map_err(|fault| vec![fault])?;
         units.insert(unknown.name.clone(), parameters[j].unit.clone());
         places.push(j);
