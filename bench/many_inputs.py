@@ -239,7 +239,7 @@ def network(x, y):
     u = x / spread
 
     def fitted(rows, hidden, activation, penalty, seed):
-        net = MLPRegressor(hidden, activation=activation, alpha=penalty, solver="lbfgs", max_iter=1000, random_state=seed)
+        net = MLPRegressor(hidden_layer_sizes=hidden, activation=activation, alpha=penalty, solver="lbfgs", max_iter=1000, random_state=seed)
         return net.fit(u[rows], z[rows])
 
     best = (np.inf, None)

@@ -135,7 +135,9 @@ fn a_measured_field_has_the_posterior_of_gaussian_process_regression() {
 fn the_conductivity_of_the_rod_is_recovered() {
     let folder = tempfile::tempdir().unwrap();
     let study = quick::root().join("configs/rod/study.toml");
-    quick::run(&study, &[], folder.path()).unwrap_or_else(|stop| panic!("{stop}"));
+    let settings =
+        ["sampler.steps=300", "sampler.warm_up=150", "model.solver.relative_tolerance=1e-6"];
+    quick::run(&study, &settings, folder.path()).unwrap_or_else(|stop| panic!("{stop}"));
     let summary = quick::summary(folder.path());
     assert_eq!(summary["converged"], true, "{}", summary["verdict"]);
     let found = &summary["fields"]["conductivity"];
@@ -174,7 +176,7 @@ axes = { x = { values = [0.0, 0.3, 1.0] } }
 distribution = { log_normal = { median = 2.0, sd = 0.5 } }
 kernel = "exponential"
 length = 0.4
-variance = 0.9
+terms = 2
 
 [response]
 name = "y"

@@ -24,6 +24,8 @@ pub struct Field {
     pub level: Vec<f64>,
     /// Eigenfunctions times the standard deviations of their coefficients, `terms x places`.
     pub modes: Matrix,
+    /// Standard deviation of `g` with all terms.
+    pub sd: f64,
     /// True if the logarithm of the field is normal.
     pub log_normal: bool,
     /// Share of the variance of `g`, integrated over the places, that the terms keep.
@@ -61,9 +63,12 @@ impl Field {
         self.level.iter().enumerate().map(value).collect()
     }
 
-    /// Standard deviation of `g` at each place, as the terms give it.
-    pub fn deviations(&self) -> Vec<f64> {
+    /// Standard deviation of the neglected terms of `g` at each place.
+    pub fn neglected(&self) -> Vec<f64> {
         let square = |i: usize| (0..self.terms()).map(|k| self.modes[(k, i)].powi(2)).sum::<f64>();
-        (0..self.at.len()).map(|i| square(i).sqrt()).collect()
+        // With all terms nothing but rounding errors is left.
+        let rest = |i: usize| (1.0 - square(i) / (self.sd * self.sd)).max(0.0);
+        let rest = |i: usize| if rest(i) < 1e-12 { 0.0 } else { self.sd * rest(i).sqrt() };
+        (0..self.at.len()).map(rest).collect()
     }
 }

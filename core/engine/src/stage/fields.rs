@@ -2,6 +2,7 @@
 
 use lacuna::data::{Draws, Field};
 use lacuna::math::moments;
+use lacuna::math::random::{Stream, normal};
 
 use crate::report::findings::{FieldBand, FieldFindings};
 use crate::study::Study;
@@ -22,10 +23,11 @@ pub fn findings(study: &Study, kept: Option<&Draws>) -> Vec<FieldFindings> {
     study.fields.iter().map(|field| describe(field)).collect()
 }
 
-/// Distribution of the truncated field at each place under the prior, in closed form.
+/// Distribution of the field at each place under the prior, in closed form.
 fn prior(field: &Field) -> FieldBand {
     let mut band = FieldBand::default();
-    for (level, sd) in field.level.iter().zip(field.deviations()) {
+    let sd = field.sd;
+    for level in &field.level {
         let ends = [-EDGE, 0.0, EDGE].map(|z| level + z * sd);
         let (mean, sd) = if field.log_normal {
             let mean = (level + 0.5 * sd * sd).exp();
@@ -38,7 +40,8 @@ fn prior(field: &Field) -> FieldBand {
     band
 }
 
-/// Distribution of a field at each place over the draws.
+/// Distribution of a field at each place over the draws. The neglected terms are drawn from their prior, on which data that a
+/// model with these terms explains have no influence.
 fn posterior(study: &Study, field: &Field, draws: &Draws) -> FieldBand {
     let names = field.coefficients();
     let place = |name: &String| study.parameters.iter().position(|p| p.name == *name);
@@ -50,9 +53,15 @@ fn posterior(study: &Study, field: &Field, draws: &Draws) -> FieldBand {
         field.values(&coefficients)
     };
     let fields: Vec<Vec<f64>> = (0..points.rows()).step_by(stride).map(values).collect();
+    let random = Stream::root(study.about.seed).named("fields").named(&field.name);
     let mut band = FieldBand::default();
-    for i in 0..field.at.len() {
-        let here: Vec<f64> = fields.iter().map(|values| values[i]).collect();
+    for (i, rest) in field.neglected().into_iter().enumerate() {
+        let mut rng = random.at(i as u64).generator();
+        let whole = |value: f64, z: f64| {
+            if field.log_normal { value * (rest * z).exp() } else { value + rest * z }
+        };
+        let here: Vec<f64> =
+            fields.iter().map(|values| whole(values[i], normal(&mut rng))).collect();
         let sorted = moments::sorted(&here);
         let ends = [0.025, 0.5, 0.975].map(|p| moments::quantile(&sorted, p));
         band.push(moments::mean(&here), moments::variance(&here).sqrt(), ends);

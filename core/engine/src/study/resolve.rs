@@ -228,7 +228,7 @@ fn structure(
         unknowns.push(unknown);
     }
     let mut about = about?;
-    let own = (parameters.as_slice(), unknowns.as_slice());
+    let own = (parameters.as_slice(), unknowns.as_slice(), fields.as_slice());
     let dependence = dependence(&dependence_sections, drawn, own, about.seed, root, problems)?;
     about.directory = None;
     let name = name(&mut about, path, root, problems)?;

@@ -19,6 +19,7 @@ fn field(log_normal: bool) -> Arc<Field> {
         at_unit: unit("m"),
         level: vec![0.5; 4],
         modes: Matrix::from_rows(4, [at, at.map(|x| x * x)]),
+        sd: 1.0,
         log_normal,
         kept: 0.9,
     })

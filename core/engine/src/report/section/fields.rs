@@ -87,7 +87,7 @@ fn figure(found: &FieldFindings, numbers: &mut Numbers) -> Markup {
     }
     let caption = Caption::new(
         format!("The field `{}` at its places, each by itself.", field.name),
-        format!("{whose} of the coefficients; the neglected terms are not in it."),
+        format!("{whose} of the coefficients; the neglected terms have their prior."),
         "a posterior as wide as the prior: the data say nothing about the field there.",
     );
     numbers.figure(&small_multiples(&[panel], &x, &y, "random field"), &keys, &caption)

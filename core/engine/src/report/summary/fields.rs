@@ -6,14 +6,15 @@ use serde::Serialize;
 use super::value::{ByName, Quantity};
 use crate::report::findings::{FieldBand, FieldFindings};
 
-/// Posterior of a random field (`[[field]]`) at its places. The posterior of its coefficients is under `parameters`.
+/// Posterior of a random field (`[[field]]`) at its places, from at most 4000 draws. The neglected terms are added with their prior.
+/// The posterior of the coefficients is under `parameters`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Field {
     /// Unit of the values of the field.
     pub unit: String,
     /// Number of terms of its expansion.
     pub terms: usize,
-    /// Share of the prior's variance, integrated over the places, that these terms keep; the rest is neglected.
+    /// Share of the prior's variance, integrated over the places, that these terms keep; the model has no others.
     pub variance: Quantity,
     /// Places.
     pub at: Vec<Quantity>,

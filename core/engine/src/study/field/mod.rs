@@ -170,6 +170,7 @@ fn field(
         at,
         at_unit,
         modes,
+        sd,
         log_normal,
         kept: expansion.kept,
     })
