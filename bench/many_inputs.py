@@ -3,6 +3,7 @@
     mkdir runs
     LACUNA_RUNS=$PWD/runs cargo test -p lacuna-plugins --lib -- --ignored runs_of_many_inputs
     python bench/many_inputs.py gradients runs
+    python bench/many_inputs.py differences runs
     python bench/many_inputs.py networks runs
 
 Needs `pip install numpy scipy scikit-learn`. The test writes the runs, two Latin hypercubes of each size, and 2000 new points.
@@ -10,6 +11,7 @@ Each line has the mean square error at the new points divided by the variance, f
 
 `gradients`: sparse expansions by orthogonal matching pursuit, from values alone and from half as many runs with their gradients
 (as many runs in all, if a gradient costs one run), and expansions in active subspaces found from these gradients.
+`differences`: the same with gradients by differences, each of which costs as many runs as there are inputs.
 `networks`: ensembles of five multilayer perceptrons, whose size and penalty are chosen by cross-validation; in parentheses the
 error as the ensemble states it: the variance between its members, and the error of the cross-validation.
 """
@@ -173,7 +175,7 @@ def best_expansion(x, law, y, slopes, inputs):
     if inputs <= 15:
         sets = [(p, q, 3) for p in (2, 3, 4, 5) for q in (0.75, 1.0)]
     else:
-        sets = [(p, q, 2) for p, q in ((1, 1.0), (2, 1.0), (3, 0.75), (4, 0.5), (6, 0.5))]
+        sets = [(p, q, 2) for p, q in ((1, 1.0), (2, 1.0), (3, 0.75), (4, 0.5), (6, 0.5), (10, 0.5)) if p < 10 or inputs <= 20]
     found = [expansion(x, law, y, slopes, dictionary(inputs, *s, most=6000 if inputs > 15 else 1200)) for s in sets]
     return min(found, key=lambda pair: pair[1])
 
@@ -276,6 +278,19 @@ def gradients(folder, name, runs):
     return lines
 
 
+def differences(folder, name, runs):
+    """Expansions with gradients by differences: one run for each input beside each point."""
+    law = name[-1]
+    new, truth, _ = read(folder / f"{name}-new.csv")
+    lines = {"points": [], "with differences": []}
+    for seed in (1, 2):
+        x, y, g = (part[: runs // (1 + new.shape[1])] for part in read(folder / f"{name}-{runs}-{seed}-half.csv"))
+        lines["points"].append(str(len(y)))
+        if len(y) >= 5:
+            lines["with differences"].append(f"{error(best_expansion(x, law, y, g, x.shape[1])[0](new), truth):.2g}")
+    return lines
+
+
 def networks(folder, name, runs):
     new, truth, _ = read(folder / f"{name}-new.csv")
     lines = {"network": [], "between members": [], "cross-validation": [], "choice": []}
@@ -292,11 +307,11 @@ def networks(folder, name, runs):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["gradients", "networks"])
+    parser.add_argument("what", choices=["gradients", "differences", "networks"])
     parser.add_argument("runs", type=pathlib.Path)
     parser.add_argument("--function", default="", help="only functions whose name begins so")
     arguments = parser.parse_args()
-    measure = {"gradients": gradients, "networks": networks}[arguments.what]
+    measure = {"gradients": gradients, "differences": differences, "networks": networks}[arguments.what]
     warnings.simplefilter("ignore")
     for name, sizes in FUNCTIONS.items():
         if not name.startswith(arguments.function):

