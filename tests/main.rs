@@ -15,6 +15,7 @@ mod effects;
 mod falling_balls;
 mod faulty_tables;
 mod fidelity;
+mod fields;
 mod forced_oscillator;
 mod forward;
 mod gap;

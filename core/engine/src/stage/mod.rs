@@ -15,6 +15,7 @@ pub mod emulated;
 pub mod emulator_error;
 pub mod evidence;
 pub mod fidelity;
+pub mod fields;
 pub mod grouped;
 pub mod idle;
 pub mod imports;

@@ -297,7 +297,7 @@ fn validation(study: &Study, complaints: &mut Complaints<'_>) {
     if study.validate.against.is_some() {
         let scale = |j: usize| study.dependence.populations.iter().any(|p| p.scale == j);
         let without = study.parameters.iter().enumerate().filter(|(_, p)| p.reference.is_none());
-        for (_, parameter) in without.filter(|(j, _)| !scale(*j)) {
+        for (_, parameter) in without.filter(|(j, _)| !scale(*j) && !study.unknowns[*j].of_field) {
             complaints
                 .at("validate.against")
                 .say(format!("the parameter `{}` has no `reference`", parameter.name))

@@ -14,6 +14,7 @@ use toml::Table;
 
 use super::dependence::{Sections, dependence};
 use super::fidelity::{low_fidelity, numerical_error};
+use super::field::{coefficients, fields};
 use super::file::{OPTIONAL, ParameterSection, ResponseSection, StudySection, ValidateSection};
 use super::forward::forward;
 use super::gap::companion::companion;
@@ -25,8 +26,8 @@ pub use super::plain::Study;
 use super::positions::positions;
 use super::predict::as_scenarios;
 use super::sections::{
-    derived, effects, layouts, name, parameters, quantities, reliability, scenarios, starts, table,
-    unknown_sections,
+    self, derived, effects, layouts, name, parameters, quantities, reliability, scenarios, starts,
+    table, unknown_sections,
 };
 use super::table::{self, PluginSections, SECTIONS};
 use super::unknowns::unknowns;
@@ -171,6 +172,7 @@ fn structure(
     unknown_sections(root, problems);
     let about = table::<StudySection>(root, "study", problems);
     let parameters = parameters(root, problems);
+    let field_sections = sections::fields(root, problems);
     let dependence_sections = Sections::read(root, problems);
     let response = match root.get("response") {
         // A target has no response, so that nothing is said of its shape.
@@ -208,17 +210,25 @@ fn structure(
         }
         _ => Some(Vec::new()),
     };
-    let (scenarios, sections) = scenarios?;
+    let (mut scenarios, sections) = scenarios?;
+    let field_sections = field_sections?;
+    let fields = fields(&field_sections, &directory, root, problems);
     let (sections_of_parameters, mut dependence_sections) = (parameters?, dependence_sections?);
     dependence_sections.read_runs(&sections_of_parameters, &directory, root, problems);
     let prior = |section: &ParameterSection| dependence_sections.prior(section);
-    let (parameters, unknowns, drawn) =
+    let (mut parameters, mut unknowns, drawn) =
         unknowns(&sections_of_parameters, &scenarios, &plugins, prior, root, problems);
     if problems.len() > before {
         return None;
     }
+    let fields = fields?;
+    scenarios.iter_mut().for_each(|scenario| scenario.fields.clone_from(&fields));
+    for (parameter, unknown) in coefficients(&fields) {
+        parameters.push(parameter);
+        unknowns.push(unknown);
+    }
     let mut about = about?;
-    let own = (parameters.as_slice(), unknowns.as_slice());
+    let own = (parameters.as_slice(), unknowns.as_slice(), fields.as_slice());
     let dependence = dependence(&dependence_sections, drawn, own, about.seed, root, problems)?;
     about.directory = None;
     let name = name(&mut about, path, root, problems)?;
@@ -234,6 +244,8 @@ fn structure(
         scenarios,
         dependence,
         dependence_sections,
+        fields,
+        field_sections,
         hierarchy: Hierarchy::of(sections_of_parameters),
         unknowns,
         given: Vec::new(),

@@ -27,7 +27,7 @@ pub(super) fn table(
     let first = |(j, (_, unknown)): &(usize, (&Parameter, &Unknown))| {
         let again = unknown.member.is_some()
             && study.unknowns[..*j].iter().any(|other| other.name == unknown.name);
-        !again && !unknown.of_population
+        !again && !unknown.of_population && !unknown.of_field
     };
     let parameters: Result<Vec<Table>, _> = study
         .parameters
@@ -66,6 +66,10 @@ pub(super) fn table(
         whole.insert("plugins".to_owned(), to_table(&study.libraries.section)?.into());
     }
     whole.insert("parameter".to_owned(), parameters?.into());
+    if !study.field_sections.is_empty() {
+        let fields: Result<Vec<Table>, _> = study.field_sections.iter().map(to_table).collect();
+        whole.insert("field".to_owned(), fields?.into());
+    }
     if !study.starts.is_empty() {
         let starts: Result<Vec<Table>, _> = study.starts.iter().map(to_table).collect();
         whole.insert("start".to_owned(), starts?.into());

@@ -19,6 +19,7 @@ use serde::de::DeserializeOwned;
 use toml::Table;
 
 use super::dependence::{ConstraintSection, DependenceSection};
+use super::field::FieldSection;
 use super::file::{
     DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, LowFidelitySection, MeasurementKeys,
     ModelKeys, NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys,
@@ -129,6 +130,7 @@ sections! {
     study: table(StudySection);
     plugins: table(PluginsSection);
     parameter: list(ParameterSection);
+    field: list(FieldSection);
     start: list(StartSection);
     dependence: list(DependenceSection);
     constraint: list(ConstraintSection);

@@ -22,6 +22,9 @@ pub struct Unknown {
     /// True for location and scale of a population, on which no response depends directly.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub of_population: bool,
+    /// True for a coefficient of a random field.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub of_field: bool,
     /// True if bounds of its value are known and no distribution; its prior is then that of the design points.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub interval: bool,
@@ -35,6 +38,7 @@ impl Unknown {
             scenario: None,
             member: None,
             of_population: false,
+            of_field: false,
             interval: false,
         }
     }
@@ -93,7 +97,7 @@ pub(super) fn unknowns(
             reference: section.reference,
         });
         let interval = matches!(section.prior, Some(Prior::Interval { .. }));
-        unknowns.push(Unknown { name, scenario, member: None, of_population: false, interval });
+        unknowns.push(Unknown { scenario, interval, ..Unknown::shared(&name) });
     };
     let named: Vec<&str> =
         scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();

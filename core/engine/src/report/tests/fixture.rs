@@ -30,6 +30,7 @@ pub fn findings() -> Findings {
         title: "SNS first target station: mercury equation of state".into(),
         study: "sns".into(),
         seed: 20_220_415,
+        fields: Vec::new(),
         intervals: Vec::new(),
         prior: Vec::new(),
         version: "0.1.0".into(),

@@ -45,6 +45,7 @@ pub(in crate::study) fn members(
             scenario: None,
             member: Some(member),
             of_population: false,
+            of_field: false,
             interval: matches!(section.prior, Some(Prior::Interval { .. })),
         });
     }
@@ -67,6 +68,7 @@ pub(in crate::study) fn members(
             scenario: None,
             member: None,
             of_population: true,
+            of_field: false,
             interval: false,
         });
     }
