@@ -41,6 +41,7 @@ mod skeletons;
 mod slurm;
 mod starts;
 mod stated_noise;
+mod stochastic;
 mod studies;
 mod tidy;
 mod truth;

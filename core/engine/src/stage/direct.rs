@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Numbers;
 use lacuna::plugin::model::{Call, EvalError, Gradient, Response};
 use lacuna::run::{Observer, Stop, files};
 use lacuna_linalg::Matrix;
@@ -44,7 +45,10 @@ impl<'a> Direct<'a> {
         let forward = ModelMap::of(study)?;
         let model = study.model.as_ref().map(|m| (m.built.identity(), &m.common));
         let sources = files::hash_sources(&forward.simulator.model.files(&study.directory))?;
-        let origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
+        let mut origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
+        if forward.is_stochastic() {
+            origin = json!([origin, study.about.seed]);
+        }
         let origin = files::hash(origin.to_string().as_bytes());
         Ok(Self { data, best_fit: None, forward, origin })
     }
@@ -151,17 +155,19 @@ impl<'a> ModelMap<'a> {
         None
     }
 
-    /// Responses to one scenario at some rows of `points`.
+    /// Responses to one scenario in some runs: the row of `points` and the number of each.
     fn some(
         &self,
         setting: &Setting<'_>,
         points: &Matrix,
-        rows: &[usize],
+        rows: &[(usize, u64)],
+        numbers: Numbers,
     ) -> Vec<Option<Vec<f64>>> {
         if self.failure().is_some() {
             return vec![None; rows.len()];
         }
-        let inputs: Vec<Vec<f64>> = rows.iter().map(|&i| setting.inputs(points.row(i))).collect();
+        let inputs = |&(i, run): &(usize, u64)| setting.inputs_of_run(points.row(i), run, numbers);
+        let inputs: Vec<Vec<f64>> = rows.iter().map(inputs).collect();
         let calls: Vec<Call<'_>> =
             inputs.iter().map(|inputs| self.simulator.call(setting, inputs)).collect();
         let mut responses = self.simulator.model.predict_batch(&calls).into_iter();
@@ -196,7 +202,8 @@ impl<'a> ModelMap<'a> {
                 around.push(moved);
             }
         }
-        let responses = self.mean(&Matrix::from_rows(point.len(), around));
+        // Differences of a stochastic response are those between runs with the same random numbers.
+        let responses = self.runs(&Matrix::from_rows(point.len(), around), 1, Numbers::Common(0));
         let slope = |i: usize, j: usize| {
             let [here, above, below] = [0, 2 * j + 1, 2 * j + 2].map(|row| responses[(row, i)]);
             match (above.is_finite(), below.is_finite()) {
@@ -224,18 +231,30 @@ impl Forward for ModelMap<'_> {
         self.outputs
     }
 
+    fn is_stochastic(&self) -> bool {
+        self.simulator.is_stochastic()
+    }
+
     fn mean(&self, points: &Matrix) -> Matrix {
+        self.runs(points, 1, Numbers::OfPoint)
+    }
+
+    fn runs(&self, points: &Matrix, count: usize, numbers: Numbers) -> Matrix {
         let size = self.simulator.model.batch().max(1);
-        let rows: Vec<usize> = (0..points.rows()).collect();
+        let of_point = |i: usize| (0..count as u64).map(move |run| (i, run));
+        let rows: Vec<(usize, u64)> = (0..points.rows()).flat_map(of_point).collect();
+        let places: Vec<usize> = (0..rows.len()).collect();
         let tasks: Vec<(&Setting<'_>, &[usize])> = self
             .simulator
             .settings
             .iter()
-            .flat_map(|setting| rows.chunks(size).map(move |some| (setting, some)))
+            .flat_map(|setting| places.chunks(size).map(move |some| (setting, some)))
             .collect();
-        let answers: Vec<Vec<Option<Vec<f64>>>> =
-            tasks.par_iter().map(|(setting, some)| self.some(setting, points, some)).collect();
-        let mut all = Matrix::zeros(points.rows(), self.outputs);
+        let answer = |(setting, some): &(&Setting<'_>, &[usize])| {
+            self.some(setting, points, &rows[some[0]..some[0] + some.len()], numbers)
+        };
+        let answers: Vec<Vec<Option<Vec<f64>>>> = tasks.par_iter().map(answer).collect();
+        let mut all = Matrix::zeros(rows.len(), self.outputs);
         for ((setting, some), answers) in tasks.iter().zip(answers) {
             for (&row, answer) in some.iter().zip(answers) {
                 let place = &mut all.row_mut(row)[setting.outputs.clone()];

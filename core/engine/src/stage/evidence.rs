@@ -55,8 +55,14 @@ pub fn stage(
         |_| {
             let draws = calibrated.value.draws.from_step(calibrated.value.outcome.burn_in);
             let mut missing = Vec::new();
-            let evidence = match &calibrated.value.outcome.evidence {
+            let outcome = &calibrated.value.outcome;
+            let evidence = match &outcome.evidence {
                 Some(evidence) => Some(evidence.clone()),
+                None if outcome.estimate.is_some() => {
+                    let text = "no evidence: bridge sampling needs a density that is not estimated";
+                    missing.push(format!("{text}; use a sampler that gives the evidence itself"));
+                    None
+                }
                 None => bridge::bridge(
                     posterior,
                     &coordinates(posterior, &thinned(&draws)),

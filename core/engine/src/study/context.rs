@@ -12,6 +12,7 @@ mod outputs;
 mod quantities;
 mod reliability;
 mod runs;
+mod stochastic;
 
 use lacuna::data::{Layout, Parameter, Scenario};
 use lacuna::math::moments;
@@ -45,6 +46,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     runs(study, &mut complaints);
     more_runs::refinement(study, &mut complaints);
     more_runs::sequential(study, &mut complaints);
+    stochastic::check(study, &mut complaints);
     validation(study, &mut complaints);
     if let Some(model) = &study.model {
         for (place, scenario) in study.scenarios.iter().enumerate() {

@@ -107,6 +107,12 @@ pub struct ModelKeys {
     /// `{ damping = "base + slope * gas_fraction" }`.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub computed: BTreeMap<String, String>,
+    /// Name of the input that receives the seed of a run, for a model whose response is random: a whole number from 1 to
+    /// 2147483647 that depends on the seed of the study, the inputs of the run and, if a likelihood is estimated from
+    /// several runs, the number of the run among them. The same inputs and the same seed must give the same response.
+    /// Default: the model is deterministic.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<Name>,
 }
 
 /// The engine's keys of `[design]`.
