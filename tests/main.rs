@@ -8,6 +8,7 @@ mod bad_input;
 mod campaign;
 mod commands;
 mod coverage;
+mod cut;
 mod dependencies;
 mod direct;
 mod docs;

@@ -11,6 +11,7 @@ pub mod multiplicative_gaussian;
 pub mod pseudo_marginal;
 pub mod scaled_gaussian_process;
 pub mod student_t;
+pub mod synthetic_likelihood;
 
 #[cfg(test)]
 mod tests;

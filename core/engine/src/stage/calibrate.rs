@@ -1,5 +1,6 @@
 //! Stage 5: sampling of the posterior of the parameters.
 
+mod cut;
 mod estimated;
 mod kept;
 mod law;
@@ -25,8 +26,10 @@ use crate::posterior::{Joint, OfData, Posterior};
 use crate::stage::inverse_problem::{InverseProblem, Trial};
 use crate::study::Study;
 
+use cut::sample_cut;
 use sample::{Asked, sample};
 
+pub use cut::CutOutcome;
 pub use estimated::LikelihoodEstimate;
 pub use law::Law;
 pub use population::{MemberOutcome, NewMember, PopulationOutcome};
@@ -70,6 +73,9 @@ pub struct Outcome {
     /// Estimate of the likelihood from runs of a stochastic model; `None` if the likelihood is not estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub estimate: Option<LikelihoodEstimate>,
+    /// Parameters that the data do not update; `None` if there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut: Option<CutOutcome>,
     /// Populations, in the order of the study's parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub populations: Vec<PopulationOutcome>,
@@ -242,7 +248,13 @@ pub fn draw(
         random: Trial::stream(trial, study, "calibrate"),
         quick: trial.is_some_and(|trial| trial.quick),
     };
-    let kept = run.keep(folder, inputs, observer, |folder| sample(&asked, folder, &progress))?;
+    let cut = study.cut();
+    let kept = if cut.is_empty() {
+        run.keep(folder, inputs, observer, |folder| sample(&asked, folder, &progress))?
+    } else {
+        let inputs = json!([inputs, cut]);
+        run.keep(folder, &inputs, observer, |folder| sample_cut(&asked, &cut, folder, &progress))?
+    };
     observer.end(Stage::Calibrate.label(), &summary(&kept.value));
     Ok(kept)
 }

@@ -74,6 +74,11 @@ pub struct ParameterSection {
     /// well a sampler moves, and not the posterior.
     #[serde(default, skip_serializing_if = "CoordinatesKey::is_auto")]
     pub coordinates: CoordinatesKey,
+    /// True if the data of this study must not update the parameter, because a model that is known to be wrong would
+    /// distort it: its posterior is its prior, which may be the posterior of an earlier run, and the other parameters have
+    /// their posterior given each of its values (cut distribution, modular Bayesian analysis).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub cut: bool,
     /// Symbol used in figures, such as `x1`. Default: the name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub symbol: Option<String>,
@@ -355,6 +360,20 @@ pub struct SamplerKeys {
     /// sampler's own number of steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stop: Option<StopRule>,
+    /// Number of values of the parameters with `cut`, at least 10; the other parameters are sampled for each of them.
+    #[serde(skip_serializing_if = "is_customary")]
+    pub imputations: Count,
+}
+
+/// Number of imputations if the study states none.
+const IMPUTATIONS: usize = 40;
+
+fn imputations() -> Count {
+    Count::new(IMPUTATIONS).unwrap_or_else(|_| unreachable!("a number above zero"))
+}
+
+fn is_customary(imputations: &Count) -> bool {
+    imputations.get() == IMPUTATIONS
 }
 
 /// Stopping rule of a sampler.
@@ -372,7 +391,7 @@ pub struct StopRule {
 impl Default for SamplerKeys {
     fn default() -> Self {
         let burn_in = Fraction::new(0.5).unwrap_or_else(|_| unreachable!("0.5 is a fraction"));
-        Self { burn_in, start: None, stop: None }
+        Self { burn_in, start: None, stop: None, imputations: imputations() }
     }
 }
 

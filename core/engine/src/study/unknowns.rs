@@ -25,6 +25,9 @@ pub struct Unknown {
     /// True if bounds of its value are known and no distribution; its prior is then that of the design points.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub interval: bool,
+    /// True if the data do not update it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub cut: bool,
 }
 
 impl Unknown {
@@ -36,6 +39,7 @@ impl Unknown {
             member: None,
             of_population: false,
             interval: false,
+            cut: false,
         }
     }
 
@@ -93,7 +97,8 @@ pub(super) fn unknowns(
             reference: section.reference,
         });
         let interval = matches!(section.prior, Some(Prior::Interval { .. }));
-        unknowns.push(Unknown { name, scenario, member: None, of_population: false, interval });
+        let (member, cut) = (None, section.cut);
+        unknowns.push(Unknown { name, scenario, member, of_population: false, interval, cut });
     };
     let named: Vec<&str> =
         scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();

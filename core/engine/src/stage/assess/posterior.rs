@@ -26,7 +26,7 @@ pub(super) fn findings(
     let mut found = convergence(&draws, outcome);
     if let Some(own) = &outcome.estimate {
         found.extend(of_estimate(own));
-    } else {
+    } else if outcome.cut.is_none() {
         found.extend(some([
             unvisited(&draws, outcome),
             modes::unreached(outcome.best_draw.1 - outcome.map_log_density),

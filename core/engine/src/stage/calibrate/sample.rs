@@ -117,6 +117,7 @@ pub(super) fn sample(
         .concat(),
         evidence,
         estimate,
+        cut: None,
         populations: population::outcomes(study, posterior, &kept),
     };
     Ok(Calibrated { draws, statistics: sampled.statistics, outcome })

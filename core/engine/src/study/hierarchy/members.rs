@@ -46,6 +46,7 @@ pub(in crate::study) fn members(
             member: Some(member),
             of_population: false,
             interval: matches!(section.prior, Some(Prior::Interval { .. })),
+            cut: section.cut,
         });
     }
     let population = section.population.as_ref()?;
@@ -68,6 +69,7 @@ pub(in crate::study) fn members(
             member: None,
             of_population: true,
             interval: false,
+            cut: false,
         });
     }
     let typical = population.unknowns()[1].1.quantile(0.5);

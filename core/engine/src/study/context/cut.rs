@@ -1,0 +1,73 @@
+//! Parameters that the data do not update.
+
+use lacuna::text::Complaints;
+
+use crate::study::Study;
+
+/// Fewest values of the cut parameters.
+const FEWEST: usize = 10;
+
+impl Study {
+    /// Places of the parameters that the data do not update.
+    pub fn cut(&self) -> Vec<usize> {
+        let cut = self.unknowns.iter().enumerate().filter(|(_, unknown)| unknown.cut);
+        cut.map(|(place, _)| place).collect()
+    }
+}
+
+/// Reports cuts without data, of all parameters, of parameters on which the priors of others depend, and beside what has no
+/// meaning for a cut distribution.
+pub(super) fn check(study: &Study, complaints: &mut Complaints<'_>) {
+    let cut = study.cut();
+    let Some(&first) = cut.first() else { return };
+    let path = |place: usize| format!("parameter.{}.cut", study.unknowns[place].name);
+    if study.measurements.is_none() {
+        complaints
+            .at(&path(first))
+            .say("the study has no measurements that could update a parameter")
+            .expected("no `cut`, or `[measurements]`");
+        return;
+    }
+    if cut.len() == study.parameters.len() {
+        complaints
+            .at(&path(first))
+            .say("all parameters are cut, and nothing is left that the data could determine")
+            .expected("at least one parameter without `cut`");
+    }
+    let dependence = &study.dependence;
+    for group in &dependence.groups {
+        let free = group.members.iter().find(|member| !cut.contains(member));
+        let Some(&own) = group.members.iter().find(|member| cut.contains(member)) else { continue };
+        if let Some(&free) = free {
+            let name = &study.parameters[free].name;
+            complaints
+                .at(&path(own))
+                .say(format!(
+                    "the prior of `{}` depends on that of `{name}`, which is not cut",
+                    study.parameters[own].name
+                ))
+                .expected("`cut` for both of them, or for neither");
+        }
+    }
+    let free_groups = dependence.groups.iter().any(|group| !cut.contains(&group.members[0]));
+    let others = [
+        (!dependence.constraints.is_empty(), "a `[[constraint]]`"),
+        (!dependence.populations.is_empty(), "populations of parameters"),
+        (free_groups, "parameters that depend on each other and are not cut"),
+        (!study.reliability.is_empty(), "`[[reliability]]`"),
+    ];
+    for (_, what) in others.iter().filter(|(present, _)| *present) {
+        complaints
+            .at(&path(first))
+            .say(format!("`cut` cannot be combined with {what}"))
+            .expected("one of the two");
+    }
+    let imputations = study.sampler.as_ref().map(|section| section.common.imputations.get());
+    if let Some(count) = imputations.filter(|count| *count < FEWEST) {
+        complaints
+            .at("sampler.imputations")
+            .say("too few values of the cut parameters to see how the others depend on them")
+            .expected(format!("at least {FEWEST}"))
+            .found(count);
+    }
+}
