@@ -267,6 +267,11 @@ impl Setting<'_> {
         inputs
     }
 
+    /// Key of the stream from which the seeds of runs are made; `None` if the model receives none.
+    pub fn seeds_of(&self) -> Option<[u64; 4]> {
+        self.seeds().next().map(|_| self.random.key())
+    }
+
     /// Indices of the inputs that receive the seed.
     fn seeds(&self) -> impl Iterator<Item = usize> {
         let sources = self.sources.iter().enumerate();

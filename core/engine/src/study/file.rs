@@ -3,15 +3,16 @@
 //! A section that chooses a plugin with `use` has keys of the engine's, which stand here, beside
 //! the plugin's own options.
 
+mod sampler;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::effect::On;
-use lacuna::plugin::sampler::Start;
 use lacuna::text::file_name::FileName;
-use lacuna::text::values::{Count, Fraction, Name, Positive};
+use lacuna::text::values::{Count, Name, Positive};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,7 @@ pub use super::noise::{InstrumentNoise, NoiseSection};
 pub use super::scenario::{FunctionSection, ScenarioSection};
 pub use lacuna::text::quantity::Quantity;
 pub use lacuna::text::response::{Axes, AxisSection, GridSection, ResponseSection};
+pub use sampler::{SamplerKeys, StopRule};
 
 /// Tables inside a section that a study may leave out: `false` takes out what another study has.
 pub(super) const OPTIONAL: [(&str, &str); 3] =
@@ -344,55 +346,6 @@ pub struct EffectKeys {
     /// unknowns everywhere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub by: Option<String>,
-}
-
-/// The engine's keys of `[sampler]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-pub struct SamplerKeys {
-    /// Burn-in: fraction of the steps, from the start of each chain, that is discarded from every summary.
-    pub burn_in: Fraction,
-    /// Starting points of the chains. Default: those recommended by the sampler, which are around the posterior maximum
-    /// unless its page says otherwise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub start: Option<Start>,
-    /// Stopping rule: sampling continues beyond the sampler's own number of steps until this is satisfied. Default: the
-    /// sampler's own number of steps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stop: Option<StopRule>,
-    /// Number of values of the parameters with `cut`, at least 10; the other parameters are sampled for each of them.
-    #[serde(skip_serializing_if = "is_customary")]
-    pub imputations: Count,
-}
-
-/// Number of imputations if the study states none.
-const IMPUTATIONS: usize = 40;
-
-fn imputations() -> Count {
-    Count::new(IMPUTATIONS).unwrap_or_else(|_| unreachable!("a number above zero"))
-}
-
-fn is_customary(imputations: &Count) -> bool {
-    imputations.get() == IMPUTATIONS
-}
-
-/// Stopping rule of a sampler.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct StopRule {
-    /// Effective sample size (ESS) to reach: the smallest over all unknowns, of bulk and tail ESS, after the burn-in.
-    pub effective_sample_size: Count,
-    /// Maximum number of steps of each chain, reached even if the ESS is not. Default: fifty times the sampler's own
-    /// number of steps.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub max_steps: Option<Count>,
-}
-
-impl Default for SamplerKeys {
-    fn default() -> Self {
-        let burn_in = Fraction::new(0.5).unwrap_or_else(|_| unreachable!("0.5 is a fraction"));
-        Self { burn_in, start: None, stop: None, imputations: imputations() }
-    }
 }
 
 /// Checks performed after the calibration.

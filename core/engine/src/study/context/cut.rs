@@ -3,6 +3,7 @@
 use lacuna::text::Complaints;
 
 use crate::study::Study;
+use crate::study::file::SamplerKeys;
 
 /// Fewest values of the cut parameters.
 const FEWEST: usize = 10;
@@ -19,7 +20,18 @@ impl Study {
 /// meaning for a cut distribution.
 pub(super) fn check(study: &Study, complaints: &mut Complaints<'_>) {
     let cut = study.cut();
-    let Some(&first) = cut.first() else { return };
+    let Some(&first) = cut.first() else {
+        let section = study.sampler.as_ref();
+        if section
+            .is_some_and(|section| section.common.imputations != SamplerKeys::default().imputations)
+        {
+            complaints
+                .at("sampler.imputations")
+                .say("no parameter is cut, so that there is nothing to impute")
+                .expected("`cut = true` in a `[[parameter]]`, or no `imputations`");
+        }
+        return;
+    };
     let path = |place: usize| format!("parameter.{}.cut", study.unknowns[place].name);
     if study.measurements.is_none() {
         complaints
