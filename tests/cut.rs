@@ -27,7 +27,7 @@ prior = { normal = [0.0, 0.1] }
 
 [response]
 name = "y"
-axes = { place = ["A"] }
+axes = { place = { values = [1], unit = "1" } }
 
 [model]
 use = "equations"
@@ -44,7 +44,7 @@ variance = { known = 0.001 }
 [sampler]
 use = "affine_invariant_ensemble"
 walkers = 10
-steps = 400
+steps = 800
 
 [validate]
 rerun_model = false
@@ -56,7 +56,7 @@ const MEAN: f64 = 1.02;
 fn written(change: impl Fn(String) -> String) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("study.toml"), change(STUDY.to_owned())).unwrap();
-    fs::write(folder.path().join("y.csv"), format!("place,y\nA,{MEAN}\n")).unwrap();
+    fs::write(folder.path().join("y.csv"), format!("place,y\n1,{MEAN}\n")).unwrap();
     folder
 }
 
@@ -78,8 +78,8 @@ fn the_cut_distribution_of_biased_data_is_exact() {
     let sd = (own + gain * gain * 0.01).sqrt();
     for (name, settings) in [
         ("ensemble", &[][..]),
-        ("no_u_turn", &["sampler.use=\"no_u_turn\"", "sampler.steps=400", "sampler.warm_up=200"]),
-        ("smc", &["sampler.use=\"sequential_monte_carlo\"", "sampler.particles=200"]),
+        ("no_u_turn", &["sampler.use=\"no_u_turn\"", "sampler.steps=300", "sampler.warm_up=150"]),
+        ("smc", &["sampler.use=\"sequential_monte_carlo\"", "sampler.particles=100"]),
     ] {
         let folder = written(|text| text);
         let summary = run(folder.path(), settings, "out");

@@ -26,7 +26,7 @@ prior = { uniform = [-2.0, 2.0] }
 
 [response]
 name = "y"
-axes = { part = ["A", "B"] }
+axes = { place = { values = [1, 2], unit = "1" } }
 
 [model]
 use = "equations"
@@ -40,27 +40,28 @@ path = "y.csv"
 [discrepancy]
 use = "pseudo_marginal"
 simulations = 5
-variance = { known = 0.09 }
+variance = { known = 0.25 }
 
 [sampler]
 use = "adaptive_metropolis"
 steps = 6000
+warm_up = 100
 
 [validate]
 rerun_model = false
 "#;
 
 const WIDTH: f64 = 2.0;
-const SD: f64 = 0.3;
-/// Values of the two parts in each replicate.
+const SD: f64 = 0.5;
+/// Values at the two places in each replicate.
 const VALUES: [[f64; 2]; 4] = [[0.9, 1.2], [-0.4, -0.1], [0.3, 0.8], [0.2, -0.3]];
 
 fn written(change: impl Fn(String) -> String) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("study.toml"), change(STUDY.to_owned())).unwrap();
-    let mut table = "replicate,part,y\n".to_owned();
+    let mut table = "replicate,place,y\n".to_owned();
     for (replicate, [a, b]) in VALUES.iter().enumerate() {
-        table.push_str(&format!("{replicate},A,{a}\n{replicate},B,{b}\n"));
+        table.push_str(&format!("{replicate},1,{a}\n{replicate},2,{b}\n"));
     }
     fs::write(folder.path().join("y.csv"), table).unwrap();
     folder
@@ -113,7 +114,7 @@ fn the_posterior_of_a_random_effect_is_exact() {
         ["sampler.use=\"adaptive_metropolis\"", "sampler.use=\"affine_invariant_ensemble\""]
     {
         let steps =
-            if sampler.contains("ensemble") { "sampler.steps=1500" } else { "sampler.steps=6000" };
+            if sampler.contains("ensemble") { "sampler.steps=700" } else { "sampler.steps=4000" };
         let folder = written(|text| text);
         let findings = run(folder.path(), &[sampler, steps], "out");
         let found = &quick::described::summary_of(&findings)["parameters"]["location"];
@@ -136,7 +137,7 @@ fn the_posterior_of_a_random_effect_is_exact() {
 #[test]
 fn the_evidence_of_a_random_effect_is_found() {
     let folder = written(|text| text);
-    let settings = ["sampler.use=\"sequential_monte_carlo\"", "sampler.particles=1500"];
+    let settings = ["sampler.use=\"sequential_monte_carlo\"", "sampler.particles=500"];
     let findings = run(folder.path(), &settings, "out");
     let summary = quick::described::summary_of(&findings);
     let number = |key: &str| summary["evidence"][key].as_f64().unwrap();
@@ -152,7 +153,7 @@ fn the_evidence_of_a_random_effect_is_found() {
 #[test]
 fn too_few_runs_and_models_that_are_not_random_are_reported() {
     let folder = written(|text| text.replace("simulations = 5", "simulations = 1"));
-    let settings = ["discrepancy.variance={ known = 1e-3 }", "sampler.steps=2000"];
+    let settings = ["discrepancy.variance={ known = 1e-3 }", "sampler.steps=1000"];
     let findings = run(folder.path(), &settings, "few");
     let found = of_code(&findings, "likelihood_estimate");
     assert!(found[0].figure.is_none_or(|variance| variance > 3.0), "{found:?}");

@@ -195,47 +195,74 @@ impl Pool<'_> {
         }
     }
 
-    /// Effective sample size of the means of the unknowns that are not cut, the smallest: their variance divided by that of
-    /// the mean of the pooled draws, which is the sum of the variance between imputations and that within them.
+    /// Effective sample size, the smallest of all means and variances: the variance of a draw divided by that of the mean of
+    /// the pooled draws, which has a part between the imputations and one within them.
     fn effective_size(&self) -> f64 {
-        let count = self.all.len() as f64;
-        let unknowns = self.all[0].outcome.coordinates.len();
-        let size = |j: usize| {
-            let (mut means, mut within, mut errors) = (Vec::new(), 0.0, 0.0);
-            for number in 0..self.all.len() {
-                let values = self.kept(number).pooled(j);
-                let variance = moments::variance(&values);
-                means.push(moments::mean(&values));
-                within += variance / count;
-                let own = &self.all[number].outcome.diagnosis.coordinates[j];
-                errors += variance / own.ess_bulk / (count * count);
-            }
-            let total = within + moments::variance(&means);
-            total / (errors + self.between(&means) / count)
-        };
-        (0..unknowns).map(size).fold(f64::INFINITY, f64::min)
+        let unknowns = self.asked.posterior.dimension();
+        (0..unknowns).map(|j| self.size_of(j)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Variance between the means of imputations that counts for the error of the mean of all: what a linear function of the
-    /// cut values leaves, because a Latin hypercube integrates that function without error (Stein, Technometrics 29 (1987)
-    /// 143); the whole variance for values that are plain draws.
+    /// Effective sample size of the mean and of the variance of a coordinate, the smaller.
+    fn size_of(&self, coordinate: usize) -> f64 {
+        let count = self.all.len();
+        let before = self.places.iter().filter(|&&place| place < coordinate).count();
+        let cut = self.places.iter().position(|&place| place == coordinate);
+        // Values of each imputation, and the effective number of them.
+        let values = |number: usize| match cut {
+            Some(k) => (vec![self.values[(number, k)]], f64::INFINITY),
+            None => {
+                let j = coordinate - before;
+                let size = self.all[number].outcome.diagnosis.coordinates[j].ess_bulk;
+                (self.kept(number).pooled(j), size)
+            }
+        };
+        let all: Vec<(Vec<f64>, f64)> = (0..count).map(values).collect();
+        let centre =
+            moments::mean(&all.iter().map(|(own, _)| moments::mean(own)).collect::<Vec<_>>());
+        let size = |of: fn(f64) -> f64| {
+            let each = all.iter().map(|(own, size)| {
+                let own: Vec<f64> = own.iter().map(|x| of(x - centre)).collect();
+                let within = if own.len() > 1 { moments::variance(&own) } else { 0.0 };
+                (moments::mean(&own), within, within / size)
+            });
+            let each: Vec<(f64, f64, f64)> = each.collect();
+            let means: Vec<f64> = each.iter().map(|(mean, ..)| *mean).collect();
+            let within: f64 = each.iter().map(|(_, within, _)| within).sum::<f64>() / count as f64;
+            let errors: f64 = each.iter().map(|(.., error)| error).sum::<f64>();
+            let of_mean = (errors / count as f64 + self.between(&means)) / count as f64;
+            (within + moments::variance(&means)) / of_mean
+        };
+        size(|x| x).min(size(|x| x * x))
+    }
+
+    /// Variance between the means of imputations that counts for the error of the mean of all.
+    ///
+    /// Values of one cut parameter are one from each stratum: half the mean square of successive differences. A Latin
+    /// hypercube of several integrates functions of each of them nearly without error (Stein, Technometrics 29 (1987) 143):
+    /// what a quadratic function of each leaves. Values that are plain draws: the whole variance.
     fn between(&self, means: &[f64]) -> f64 {
-        let whole = moments::variance(means);
-        let (rows, columns) = (means.len(), self.places.len() + 1);
+        let (rows, columns) = (means.len(), 2 * self.places.len() + 1);
         if !self.asked.posterior.prior().is_independent() || rows <= columns + 1 {
-            return whole;
+            return moments::variance(means);
         }
-        let scaled: Vec<Vec<f64>> = (0..self.places.len())
-            .map(|j| {
-                let column = self.values.column(j);
-                let (mean, sd) = (moments::mean(&column), moments::variance(&column).sqrt());
-                column.iter().map(|x| (x - mean) / sd.max(f64::MIN_POSITIVE)).collect()
-            })
-            .collect();
-        let design =
-            Matrix::from_fn(rows, columns, |i, j| if j == 0 { 1.0 } else { scaled[j - 1][i] });
+        if self.places.len() == 1 {
+            let mut order: Vec<usize> = (0..rows).collect();
+            order.sort_by(|&a, &b| self.values[(a, 0)].total_cmp(&self.values[(b, 0)]));
+            let step = |pair: &[usize]| (means[pair[1]] - means[pair[0]]).powi(2);
+            return order.windows(2).map(step).sum::<f64>() / (2.0 * (rows - 1) as f64);
+        }
+        let scaled = |j: usize| {
+            let column = self.values.column(j);
+            let (mean, sd) = (moments::mean(&column), moments::variance(&column).sqrt());
+            column.iter().map(|x| (x - mean) / sd.max(f64::MIN_POSITIVE)).collect::<Vec<f64>>()
+        };
+        let scaled: Vec<Vec<f64>> = (0..self.places.len()).map(scaled).collect();
+        let design = Matrix::from_fn(rows, columns, |i, j| match j {
+            0 => 1.0,
+            _ => scaled[(j - 1) / 2][i].powi(if j % 2 == 1 { 1 } else { 2 }),
+        });
         let Ok(fit) = least_squares(&design, &Matrix::from_fn(rows, 1, |i, _| means[i])) else {
-            return whole;
+            return moments::variance(means);
         };
         let left = |i: usize| {
             let fitted: f64 = (0..columns).map(|j| design[(i, j)] * fit.solution[(j, 0)]).sum();
