@@ -125,7 +125,7 @@ def modular():
         "correlation_length = { log_normal = [0.7, 0.7] }",
         "variance = { known = 1e-4 }",
     ]
-    sampler = ENSEMBLE.format(walkers=12, steps=450)
+    sampler = ENSEMBLE.format(walkers=12, steps=1000)
     free = discrepancy("gaussian", "variance = { half_normal = 0.1 }") + sampler
     known = discrepancy("gaussian", "variance = { known = 1e-4 }") + sampler
     smooth = discrepancy("gaussian_process", "orthogonal = false", *process) + sampler

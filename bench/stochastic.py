@@ -137,7 +137,7 @@ def row(name, program, folder, text, data, parameters):
         error = found["sd"] / found["ess_bulk"] ** 0.5
         cells.append(f"{found['mean']:.3f} ± {error:.3f}, {found['sd']:.3f}")
         least = min(least, found["ess_bulk"])
-    cells.append(f"{estimate['variance']:.2g}")
+    cells.append("infinite" if estimate["variance"] is None else f"{estimate['variance']:.2g}")
     cells.append(f"{100 * estimate['longest_stay']:.2g} %")
     cells.append(f"{1000 * least / (evaluations * estimate['runs']):.2g}")
     print(f"| {name} | " + " | ".join(cells) + " |", flush=True)

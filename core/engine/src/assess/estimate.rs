@@ -48,12 +48,13 @@ pub fn rules() -> Vec<Rule> {
     ]
 }
 
-/// Finding about the variance of a log-likelihood's estimate from so many runs.
-pub fn variance(variance: f64, runs: usize) -> Option<Finding> {
-    if variance <= LARGEST {
+/// Finding about the variance of a log-likelihood's estimate from so many runs; the variance of an estimate that may be zero
+/// is `None`.
+pub fn variance(variance: Option<f64>, runs: usize) -> Option<Finding> {
+    if variance.is_some_and(|variance| variance <= LARGEST) {
         return None;
     }
-    let message = if variance.is_finite() {
+    let message = if let Some(variance) = variance {
         format!(
             "the estimate of the log-likelihood has the variance {} with {runs} runs of the model, and 1 to 3 is best: \
              {} times as many would give {AIM}",
@@ -65,7 +66,7 @@ pub fn variance(variance: f64, runs: usize) -> Option<Finding> {
             "with {runs} runs of the model the likelihood is estimated as zero in the middle of the posterior"
         )
     };
-    let figures = (variance, LARGEST);
+    let figures = (variance.unwrap_or(f64::INFINITY), LARGEST);
     Some(Finding::new((ESTIMATE, ""), figures, Severity::Reservation, message, MORE))
 }
 
@@ -92,10 +93,10 @@ mod tests {
 
     #[test]
     fn a_variance_above_three_asks_for_more_runs() {
-        assert_eq!(variance(3.0, 10), None);
-        let found = variance(5.1, 10).map(|finding| finding.message).unwrap_or_default();
+        assert_eq!(variance(Some(3.0), 10), None);
+        let found = variance(Some(5.1), 10).map(|finding| finding.message).unwrap_or_default();
         assert!(found.contains("3 times as many"), "{found}");
-        assert!(variance(f64::INFINITY, 10).is_some_and(|finding| finding.figure.is_none()));
+        assert!(variance(None, 10).is_some_and(|finding| finding.figure.is_none()));
         assert_eq!(sticking(0.05), None);
         assert!(sticking(0.051).is_some());
     }

@@ -49,6 +49,10 @@ pub(super) fn sample_cut(
 ) -> Result<Calibrated, Stop> {
     let (posterior, study) = (asked.posterior, asked.study);
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
+    if posterior.dimension() == places.len() {
+        let text = "all unknowns are cut, and nothing is left that the data could determine";
+        return Err(Stop::new(text).help("take `cut` out of at least one parameter"));
+    }
     let count = section.common.imputations.get();
     let values = cut_values(asked, places, count);
     let nothing = CutValues { places: places.to_vec(), values: Vec::new() };
@@ -291,6 +295,7 @@ impl Pool<'_> {
     /// The estimate of the likelihood with the largest variance, of those that exist.
     fn worst_estimate(&self) -> Option<LikelihoodEstimate> {
         let all = self.all.iter().filter_map(|own| own.outcome.estimate.clone());
-        all.max_by(|a, b| a.variance.total_cmp(&b.variance))
+        let size = |own: &LikelihoodEstimate| own.variance.unwrap_or(f64::INFINITY);
+        all.max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 }

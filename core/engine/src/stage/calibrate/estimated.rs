@@ -37,8 +37,8 @@ pub struct LikelihoodEstimate {
     /// Number of runs of the model per estimate.
     pub runs: usize,
     /// Variance of the log-likelihood's estimate at the centre of the posterior, from estimates with different random
-    /// numbers; infinite if one of them is zero.
-    pub variance: f64,
+    /// numbers; `None` if one of them is zero, so that its logarithm is infinite.
+    pub variance: Option<f64>,
     /// True if all these estimates are equal: the response does not depend on the seed.
     pub deterministic: bool,
     /// Longest time for which a chain stayed at one point after the burn-in, as a share of its steps; `None` if the draws
@@ -49,7 +49,7 @@ pub struct LikelihoodEstimate {
 impl LikelihoodEstimate {
     /// The estimate as facts for the report.
     pub(super) fn facts(&self) -> Vec<Fact> {
-        let variance = significant(self.variance, 2);
+        let variance = self.variance.map_or("infinite".to_owned(), |v| significant(v, 2));
         let mut facts = vec![
             Fact::new("runs of the model per estimate of the likelihood", self.runs),
             Fact::new("variance of the log-likelihood's estimate", variance),
@@ -221,7 +221,7 @@ impl<'a> Estimated<'a> {
         let finite = values.iter().all(|value| value.is_finite());
         Ok(LikelihoodEstimate {
             runs: self.posterior.runs().unwrap_or(1),
-            variance: if finite { moments::variance(&values) } else { f64::INFINITY },
+            variance: finite.then(|| moments::variance(&values)),
             deterministic: values.iter().all(|value| value.to_bits() == values[0].to_bits()),
             longest_stay: chains.then(|| longest_stay(draws)),
         })

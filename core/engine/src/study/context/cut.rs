@@ -16,7 +16,7 @@ impl Study {
     }
 }
 
-/// Reports cuts without data, of all parameters, of parameters on which the priors of others depend, and beside what has no
+/// Reports cuts without data, of parameters on which the priors of others depend, and beside what has no
 /// meaning for a cut distribution.
 pub(super) fn check(study: &Study, complaints: &mut Complaints<'_>) {
     let cut = study.cut();
@@ -39,12 +39,6 @@ pub(super) fn check(study: &Study, complaints: &mut Complaints<'_>) {
             .say("the study has no measurements that could update a parameter")
             .expected("no `cut`, or `[measurements]`");
         return;
-    }
-    if cut.len() == study.parameters.len() {
-        complaints
-            .at(&path(first))
-            .say("all parameters are cut, and nothing is left that the data could determine")
-            .expected("at least one parameter without `cut`");
     }
     let dependence = &study.dependence;
     for group in &dependence.groups {
