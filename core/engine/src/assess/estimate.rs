@@ -16,8 +16,7 @@ const STAY: f64 = 0.05;
 
 const MORE: &str =
     "raise `simulations` of `[discrepancy]`: the variance falls in inverse proportion to it";
-const OTHER: &str =
-    "use the discrepancy `gaussian`; if the model should be random, check that it uses its seed";
+const OTHER: &str = "use a discrepancy for deterministic models; if this one should be random, check that it uses its seed";
 
 /// Rules of this module; see [`super::rules`].
 pub fn rules() -> Vec<Rule> {

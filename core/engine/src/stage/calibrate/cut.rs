@@ -31,7 +31,7 @@ const POOLED: usize = 8000;
 /// of many sets.
 const LARGEST_R_HAT: f64 = 1.1;
 
-/// What was cut.
+/// Parameters that the data did not update.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CutOutcome {
     /// Names of the parameters.

@@ -35,7 +35,7 @@ pub(super) fn check(study: &Study, complaints: &mut Complaints<'_>) {
         complaints
             .at("sampler.use")
             .say("this sampler follows derivatives, which an estimated likelihood does not have")
-            .expected("a sampler without derivatives, such as the default of `lacuna new study`")
+            .expected("a sampler without derivatives")
             .help("docs/samplers.md lists them");
     }
     if !study.starts.is_empty() {
