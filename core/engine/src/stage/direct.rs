@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Numbers;
 use lacuna::plugin::model::{Call, EvalError, Gradient, Response};
 use lacuna::run::{Observer, Stop, files};
 use lacuna_linalg::Matrix;
@@ -49,7 +50,10 @@ impl<'a> Direct<'a> {
         let sources = files::hash_sources(&forward.simulator.model.files(&study.directory))?;
         let made_from = json!([model, study.scenarios, study.layouts, sources]);
         forward.calls = Some(Calls::open(calls_file(run, &made_from)?));
-        let origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
+        let mut origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
+        if forward.is_stochastic() {
+            origin = json!([origin, study.about.seed]);
+        }
         let origin = files::hash(origin.to_string().as_bytes());
         Ok(Self { data, best_fit: None, forward, origin })
     }
@@ -165,10 +169,18 @@ impl<'a> ModelMap<'a> {
         None
     }
 
-    /// Responses to one scenario at some rows of `points`; those that are kept are not computed again.
-    fn some(&self, place: usize, points: &Matrix, rows: &[usize]) -> Vec<Option<Vec<f64>>> {
+    /// Responses to one scenario in some runs: the row of `points` and the number of each. Those that are kept are not
+    /// computed again.
+    fn some(
+        &self,
+        place: usize,
+        points: &Matrix,
+        rows: &[(usize, u64)],
+        numbers: Numbers,
+    ) -> Vec<Option<Vec<f64>>> {
         let setting = &self.simulator.settings[place];
-        let inputs: Vec<Vec<f64>> = rows.iter().map(|&i| setting.inputs(points.row(i))).collect();
+        let inputs = |&(i, run): &(usize, u64)| setting.inputs_of_run(points.row(i), run, numbers);
+        let inputs: Vec<Vec<f64>> = rows.iter().map(inputs).collect();
         let known = |inputs: &Vec<f64>| self.calls.as_ref()?.response(place, inputs);
         let mut answers: Vec<Option<Vec<f64>>> = inputs.iter().map(known).collect();
         let missing: Vec<usize> = (0..rows.len()).filter(|&k| answers[k].is_none()).collect();
@@ -235,7 +247,8 @@ impl<'a> ModelMap<'a> {
                 around.push(moved);
             }
         }
-        let responses = self.mean(&Matrix::from_rows(point.len(), around));
+        // Differences of a stochastic response are those between runs with the same random numbers.
+        let responses = self.runs(&Matrix::from_rows(point.len(), around), 1, Numbers::Common(0));
         let slope = |i: usize, j: usize| {
             let [here, above, below] = [0, 2 * j + 1, 2 * j + 2].map(|row| responses[(row, i)]);
             match (above.is_finite(), below.is_finite()) {
@@ -263,16 +276,28 @@ impl Forward for ModelMap<'_> {
         self.outputs
     }
 
+    fn is_stochastic(&self) -> bool {
+        self.simulator.is_stochastic()
+    }
+
     fn mean(&self, points: &Matrix) -> Matrix {
+        self.runs(points, 1, Numbers::OfPoint)
+    }
+
+    fn runs(&self, points: &Matrix, count: usize, numbers: Numbers) -> Matrix {
         let size = self.simulator.model.batch().max(1);
-        let rows: Vec<usize> = (0..points.rows()).collect();
+        let of_point = |i: usize| (0..count as u64).map(move |run| (i, run));
+        let rows: Vec<(usize, u64)> = (0..points.rows()).flat_map(of_point).collect();
+        let all_rows: Vec<usize> = (0..rows.len()).collect();
         let settings = &self.simulator.settings;
         let tasks: Vec<(usize, &[usize])> = (0..settings.len())
-            .flat_map(|place| rows.chunks(size).map(move |some| (place, some)))
+            .flat_map(|place| all_rows.chunks(size).map(move |some| (place, some)))
             .collect();
-        let answers: Vec<Vec<Option<Vec<f64>>>> =
-            tasks.par_iter().map(|&(place, some)| self.some(place, points, some)).collect();
-        let mut all = Matrix::zeros(points.rows(), self.outputs);
+        let answer = |&(place, some): &(usize, &[usize])| {
+            self.some(place, points, &rows[some[0]..some[0] + some.len()], numbers)
+        };
+        let answers: Vec<Vec<Option<Vec<f64>>>> = tasks.par_iter().map(answer).collect();
+        let mut all = Matrix::zeros(rows.len(), self.outputs);
         for (&(place, some), answers) in tasks.iter().zip(answers) {
             for (&row, answer) in some.iter().zip(answers) {
                 let outputs = &mut all.row_mut(row)[settings[place].outputs.clone()];

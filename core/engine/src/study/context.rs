@@ -1,6 +1,7 @@
 //! Second layer of checking: the sections of a study against each other.
 
 mod companion;
+mod cut;
 mod effects;
 mod gap;
 mod inputs;
@@ -12,6 +13,7 @@ mod outputs;
 mod quantities;
 mod reliability;
 mod runs;
+mod stochastic;
 
 use lacuna::data::{Layout, Parameter, Scenario};
 use lacuna::math::moments;
@@ -45,6 +47,8 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     runs(study, &mut complaints);
     more_runs::refinement(study, &mut complaints);
     more_runs::sequential(study, &mut complaints);
+    stochastic::check(study, &mut complaints);
+    cut::check(study, &mut complaints);
     validation(study, &mut complaints);
     if let Some(model) = &study.model {
         for (place, scenario) in study.scenarios.iter().enumerate() {

@@ -128,6 +128,9 @@ pub(super) fn all_given(study: &Study) -> Vec<Given> {
     for (name, quantity) in study.model.iter().flat_map(|model| &model.common.fixed) {
         add(name, quantity.unit.as_ref());
     }
+    if let Some(seed) = study.model.as_ref().and_then(|model| model.common.seed.as_ref()) {
+        add(seed.as_str(), None);
+    }
     given
 }
 

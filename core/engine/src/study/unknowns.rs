@@ -28,6 +28,9 @@ pub struct Unknown {
     /// True if bounds of its value are known and no distribution; its prior is then that of the design points.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub interval: bool,
+    /// True if the data do not update it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub cut: bool,
 }
 
 impl Unknown {
@@ -40,6 +43,7 @@ impl Unknown {
             of_population: false,
             of_field: false,
             interval: false,
+            cut: false,
         }
     }
 
@@ -97,7 +101,8 @@ pub(super) fn unknowns(
             reference: section.reference,
         });
         let interval = matches!(section.prior, Some(Prior::Interval { .. }));
-        unknowns.push(Unknown { scenario, interval, ..Unknown::shared(&name) });
+        let cut = section.cut;
+        unknowns.push(Unknown { scenario, interval, cut, ..Unknown::shared(&name) });
     };
     let named: Vec<&str> =
         scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();

@@ -65,6 +65,12 @@ pub(super) fn check(
             None => no_input(name, &path, signature, complaints),
         }
     }
+    if let Some(seed) = section.and_then(|keys| keys.seed.as_ref()) {
+        match find(seed.as_str()) {
+            Some(input) => known_fits(1.0, None, input, "model.seed", &mut set, complaints),
+            None => no_input(seed.as_str(), "model.seed", signature, complaints),
+        }
+    }
     let is_set = |name: &String| set.contains(&name.as_str()) || set_by_fields.contains(name);
     let missing = |input: &&Input| input.default.is_none() && !is_set(&input.name);
     for input in signature.inputs.iter().filter(missing) {

@@ -47,6 +47,7 @@ pub(in crate::study) fn members(
             of_population: false,
             of_field: false,
             interval: matches!(section.prior, Some(Prior::Interval { .. })),
+            cut: section.cut,
         });
     }
     let population = section.population.as_ref()?;
@@ -70,6 +71,7 @@ pub(in crate::study) fn members(
             of_population: true,
             of_field: false,
             interval: false,
+            cut: false,
         });
     }
     let typical = population.unknowns()[1].1.quantile(0.5);
