@@ -14,10 +14,10 @@ use toml::Table;
 
 use super::dependence::{Sections, dependence};
 use super::fidelity::{low_fidelity, numerical_error};
-use super::field::{coefficients, fields};
+use super::field::{enter, fields};
 use super::file::{OPTIONAL, ParameterSection, ResponseSection, StudySection, ValidateSection};
 use super::forward::forward;
-use super::gap::companion::companion;
+use super::gap::companion::{Companion, companion};
 use super::gap::gap;
 use super::hierarchy::{Hierarchy, groups_as_scenarios, trained};
 pub use super::libraries::Use;
@@ -222,11 +222,7 @@ fn structure(
         return None;
     }
     let fields = fields?;
-    scenarios.iter_mut().for_each(|scenario| scenario.fields.clone_from(&fields));
-    for (parameter, unknown) in coefficients(&fields) {
-        parameters.push(parameter);
-        unknowns.push(unknown);
-    }
+    enter(&fields, &mut scenarios, (&mut parameters, &mut unknowns));
     let mut about = about?;
     let own = (parameters.as_slice(), unknowns.as_slice(), fields.as_slice());
     let dependence = dependence(&dependence_sections, drawn, own, about.seed, root, problems)?;
@@ -267,10 +263,7 @@ fn structure(
     study.given = inputs::all_given(&study);
     study.hierarchy.trained = trained(&study, root);
     if let Some(node) = root.find("gap.companion") {
-        let own = problems.within("gap", |problems| {
-            problems.within("companion", |problems| companion(&study, node, problems))
-        });
-        study.gap.companion = Some(Box::new(own?));
+        study.gap.companion = Some(Box::new(companion_of(&study, node, problems)?));
     }
     match resolved::table(&study, response?.as_ref(), &sections) {
         Ok(resolved) => study.resolved = resolved,
@@ -280,6 +273,13 @@ fn structure(
         }
     }
     Some(study)
+}
+
+/// `[gap.companion]`.
+fn companion_of(study: &Study, node: &Node, problems: &mut Problems) -> Option<Companion> {
+    problems.within("gap", |problems| {
+        problems.within("companion", |problems| companion(study, node, problems))
+    })
 }
 
 /// Third layer: what the plugins need of the machine.

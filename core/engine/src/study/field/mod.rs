@@ -13,9 +13,10 @@ mod keys;
 use std::path::Path;
 use std::sync::Arc;
 
-use lacuna::data::{Axis, Coordinates, Field, Parameter, Unit};
+use lacuna::data::{Axis, Coordinates, Field, Parameter, Scenario, Unit};
 use lacuna::expression::{Fault, Scope};
 use lacuna::math::distribution::Distribution;
+use lacuna::text::values::OpenFraction;
 use lacuna::text::{Complaints, Node, Problems};
 use lacuna_linalg::Matrix;
 
@@ -114,7 +115,7 @@ fn keep(section: &FieldSection, places: usize, complaints: &mut Complaints<'_>) 
             None
         }
         (Some(terms), None) => Some(Keep::Terms(terms.get())),
-        (None, variance) => Some(Keep::Variance(variance.map_or(VARIANCE, |share| share.get()))),
+        (None, variance) => Some(Keep::Variance(variance.map_or(VARIANCE, OpenFraction::get))),
     }
 }
 
@@ -211,11 +212,17 @@ impl Level {
     }
 }
 
-/// The coefficients of fields as parameters, with their unknowns.
-pub(super) fn coefficients(fields: &[Arc<Field>]) -> Vec<(Parameter, Unknown)> {
-    let one = |name: String| {
-        let parameter = Parameter::plain(&name, Distribution::Normal([0.0, 1.0]));
-        (parameter, Unknown { of_field: true, ..Unknown::shared(&name) })
-    };
-    fields.iter().flat_map(|field| field.coefficients()).map(one).collect()
+/// Adds fields to the conditions, and their coefficients to the parameters and their unknowns.
+pub(super) fn enter(
+    fields: &[Arc<Field>],
+    scenarios: &mut [Scenario],
+    (parameters, unknowns): (&mut Vec<Parameter>, &mut Vec<Unknown>),
+) {
+    for scenario in scenarios {
+        scenario.fields = fields.to_vec();
+    }
+    for name in fields.iter().flat_map(|field| field.coefficients()) {
+        parameters.push(Parameter::plain(&name, Distribution::Normal([0.0, 1.0])));
+        unknowns.push(Unknown { of_field: true, ..Unknown::shared(&name) });
+    }
 }
