@@ -26,8 +26,8 @@ pub use super::plain::Study;
 use super::positions::positions;
 use super::predict::as_scenarios;
 use super::sections::{
-    self, derived, effects, layouts, name, parameters, quantities, reliability, scenarios, starts,
-    table, unknown_sections,
+    derived, effects, layouts, name, parameters, quantities, reliability, scenarios, starts, table,
+    unknown_sections,
 };
 use super::table::{self, PluginSections, SECTIONS};
 use super::unknowns::unknowns;
@@ -172,7 +172,6 @@ fn structure(
     unknown_sections(root, problems);
     let about = table::<StudySection>(root, "study", problems);
     let parameters = parameters(root, problems);
-    let field_sections = sections::fields(root, problems);
     let dependence_sections = Sections::read(root, problems);
     let response = match root.get("response") {
         // A target has no response, so that nothing is said of its shape.
@@ -181,6 +180,7 @@ fn structure(
     };
     let directory = directory(path, root);
     let scenarios = scenarios(root, &directory, problems);
+    let fields = fields(root, &directory, problems);
     let before = problems.len();
     let plugins = PluginSections::read(root, problems);
     let numerical_error = numerical_error(root, problems);
@@ -211,8 +211,6 @@ fn structure(
         _ => Some(Vec::new()),
     };
     let (mut scenarios, sections) = scenarios?;
-    let field_sections = field_sections?;
-    let fields = fields(&field_sections, &directory, root, problems);
     let (sections_of_parameters, mut dependence_sections) = (parameters?, dependence_sections?);
     dependence_sections.read_runs(&sections_of_parameters, &directory, root, problems);
     let prior = |section: &ParameterSection| dependence_sections.prior(section);
@@ -221,7 +219,7 @@ fn structure(
     if problems.len() > before {
         return None;
     }
-    let fields = fields?;
+    let (field_sections, fields) = fields?;
     enter(&fields, &mut scenarios, (&mut parameters, &mut unknowns));
     let mut about = about?;
     let own = (parameters.as_slice(), unknowns.as_slice(), fields.as_slice());
@@ -265,13 +263,10 @@ fn structure(
     if let Some(node) = root.find("gap.companion") {
         study.gap.companion = Some(Box::new(companion_of(&study, node, problems)?));
     }
-    match resolved::table(&study, response?.as_ref(), &sections) {
-        Ok(resolved) => study.resolved = resolved,
-        Err(error) => {
-            problems.report(None, format!("the study with its defaults {error}"));
-            return None;
-        }
-    }
+    let resolved = resolved::table(&study, response?.as_ref(), &sections).map_err(|error| {
+        problems.report(None, format!("the study with its defaults {error}"));
+    });
+    study.resolved = resolved.ok()?;
     Some(study)
 }
 

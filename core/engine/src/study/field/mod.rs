@@ -20,6 +20,7 @@ use lacuna::text::values::OpenFraction;
 use lacuna::text::{Complaints, Node, Problems};
 use lacuna_linalg::Matrix;
 
+use super::sections;
 use super::unknowns::Unknown;
 use expansion::{Expansion, Keep};
 
@@ -35,14 +36,14 @@ const TABLE: &str = "level";
 /// Share of the variance that is kept if the study states none.
 const VARIANCE: f64 = 0.95;
 
-/// The fields of all sections; `None` after reporting an error.
+/// The fields of all sections, beside these; `None` after reporting an error.
 pub(super) fn fields(
-    sections: &[FieldSection],
-    directory: &Path,
     root: &Node,
+    directory: &Path,
     problems: &mut Problems,
-) -> Option<Vec<Arc<Field>>> {
+) -> Option<(Vec<FieldSection>, Vec<Arc<Field>>)> {
     let before = problems.len();
+    let sections = sections::fields(root, problems)?;
     let mut complaints = Complaints::new(root, problems);
     let mut fields = Vec::new();
     for (i, section) in sections.iter().enumerate() {
@@ -55,7 +56,7 @@ pub(super) fn fields(
         }
         fields.extend(field(section, directory, &mut complaints).map(Arc::new));
     }
-    (problems.len() == before).then_some(fields)
+    (problems.len() == before).then_some((sections, fields))
 }
 
 /// The axis of the places; `None` after reporting an error.
