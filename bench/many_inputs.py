@@ -310,13 +310,14 @@ def main():
     parser.add_argument("what", choices=["gradients", "differences", "networks"])
     parser.add_argument("runs", type=pathlib.Path)
     parser.add_argument("--function", default="", help="only functions whose name begins so")
+    parser.add_argument("--sizes", type=int, nargs="*", help="only these numbers of runs")
     arguments = parser.parse_args()
     measure = {"gradients": gradients, "differences": differences, "networks": networks}[arguments.what]
     warnings.simplefilter("ignore")
     for name, sizes in FUNCTIONS.items():
         if not name.startswith(arguments.function):
             continue
-        for runs in sizes:
+        for runs in (size for size in sizes if not arguments.sizes or size in arguments.sizes):
             start = time.process_time()
             lines = measure(arguments.runs, name, runs)
             cells = "; ".join(f"{what}: {', '.join(found)}" for what, found in lines.items())

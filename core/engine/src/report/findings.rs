@@ -1,6 +1,6 @@
 //! The content of the report, as plain data gathered from the artifacts of the stages.
 
-use lacuna::data::{FailedRun, Field, Layouts, Observations, Parameter, Unit};
+use lacuna::data::{FailedRun, Layouts, Observations, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Fact;
 use lacuna::plugin::sampler::Evidence;
@@ -13,6 +13,7 @@ use crate::screening::Screening;
 
 pub use crate::gap::result::GapFindings;
 use crate::stage::calibrate::PopulationOutcome;
+pub use crate::stage::fields::{FieldBand, FieldFindings};
 pub use crate::stage::quantities::{
     Bounds, BoundsFindings, End, InputShare, PROBABILITIES, Propagated, QuantityFindings, Range,
 };
@@ -72,43 +73,6 @@ pub struct Findings {
     pub warnings: Vec<String>,
     /// Limits of the model and the data, such as that they are a stand-in: the `note` of the study.
     pub note: Option<String>,
-}
-
-/// Random field as an input of the model.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FieldFindings {
-    /// The field.
-    pub field: Field,
-    /// Prior at its places.
-    pub prior: FieldBand,
-    /// Posterior at its places, of a study with data.
-    pub posterior: Option<FieldBand>,
-}
-
-/// Distribution of a field at each of its places, in its unit.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct FieldBand {
-    /// Mean.
-    pub mean: Vec<f64>,
-    /// Standard deviation.
-    pub sd: Vec<f64>,
-    /// 2.5 % quantile.
-    pub q025: Vec<f64>,
-    /// Median.
-    pub median: Vec<f64>,
-    /// 97.5 % quantile.
-    pub q975: Vec<f64>,
-}
-
-impl FieldBand {
-    /// Adds the next place: mean, standard deviation, and the quantiles in ascending order.
-    pub fn push(&mut self, mean: f64, sd: f64, [low, middle, high]: [f64; 3]) {
-        self.mean.push(mean);
-        self.sd.push(sd);
-        self.q025.push(low);
-        self.median.push(middle);
-        self.q975.push(high);
-    }
 }
 
 /// Simulation runs.

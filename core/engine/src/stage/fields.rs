@@ -4,8 +4,44 @@ use lacuna::data::{Draws, Field};
 use lacuna::math::moments;
 use lacuna::math::random::{Stream, normal};
 
-use crate::report::findings::{FieldBand, FieldFindings};
 use crate::study::Study;
+
+/// Random field as an input of the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldFindings {
+    /// The field.
+    pub field: Field,
+    /// Prior at its places.
+    pub prior: FieldBand,
+    /// Posterior at its places, of a study with data.
+    pub posterior: Option<FieldBand>,
+}
+
+/// Distribution of a field at each of its places, in its unit.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FieldBand {
+    /// Mean.
+    pub mean: Vec<f64>,
+    /// Standard deviation.
+    pub sd: Vec<f64>,
+    /// 2.5 % quantile.
+    pub q025: Vec<f64>,
+    /// Median.
+    pub median: Vec<f64>,
+    /// 97.5 % quantile.
+    pub q975: Vec<f64>,
+}
+
+impl FieldBand {
+    /// Adds the next place: mean, standard deviation, and the quantiles in ascending order.
+    pub fn push(&mut self, mean: f64, sd: f64, [low, middle, high]: [f64; 3]) {
+        self.mean.push(mean);
+        self.sd.push(sd);
+        self.q025.push(low);
+        self.median.push(middle);
+        self.q975.push(high);
+    }
+}
 
 /// Largest number of draws, equally spaced, from which a field is described.
 const MOST_DRAWS: usize = 4000;

@@ -14,10 +14,10 @@ use toml::Table;
 
 use super::dependence::{Sections, dependence};
 use super::fidelity::{low_fidelity, numerical_error};
-use super::field::{coefficients, fields};
+use super::field::{enter, fields};
 use super::file::{OPTIONAL, ParameterSection, ResponseSection, StudySection, ValidateSection};
 use super::forward::forward;
-use super::gap::companion::companion;
+use super::gap::companion::{Companion, companion};
 use super::gap::gap;
 use super::hierarchy::{Hierarchy, groups_as_scenarios, trained};
 pub use super::libraries::Use;
@@ -26,8 +26,8 @@ pub use super::plain::Study;
 use super::positions::positions;
 use super::predict::as_scenarios;
 use super::sections::{
-    self, derived, effects, layouts, name, parameters, quantities, reliability, scenarios, starts,
-    table, unknown_sections,
+    derived, effects, layouts, name, parameters, quantities, reliability, scenarios, starts, table,
+    unknown_sections,
 };
 use super::table::{self, PluginSections, SECTIONS};
 use super::unknowns::unknowns;
@@ -172,7 +172,6 @@ fn structure(
     unknown_sections(root, problems);
     let about = table::<StudySection>(root, "study", problems);
     let parameters = parameters(root, problems);
-    let field_sections = sections::fields(root, problems);
     let dependence_sections = Sections::read(root, problems);
     let response = match root.get("response") {
         // A target has no response, so that nothing is said of its shape.
@@ -181,6 +180,7 @@ fn structure(
     };
     let directory = directory(path, root);
     let scenarios = scenarios(root, &directory, problems);
+    let fields = fields(root, &directory, problems);
     let before = problems.len();
     let plugins = PluginSections::read(root, problems);
     let numerical_error = numerical_error(root, problems);
@@ -211,8 +211,6 @@ fn structure(
         _ => Some(Vec::new()),
     };
     let (mut scenarios, sections) = scenarios?;
-    let field_sections = field_sections?;
-    let fields = fields(&field_sections, &directory, root, problems);
     let (sections_of_parameters, mut dependence_sections) = (parameters?, dependence_sections?);
     dependence_sections.read_runs(&sections_of_parameters, &directory, root, problems);
     let prior = |section: &ParameterSection| dependence_sections.prior(section);
@@ -221,12 +219,8 @@ fn structure(
     if problems.len() > before {
         return None;
     }
-    let fields = fields?;
-    scenarios.iter_mut().for_each(|scenario| scenario.fields.clone_from(&fields));
-    for (parameter, unknown) in coefficients(&fields) {
-        parameters.push(parameter);
-        unknowns.push(unknown);
-    }
+    let (field_sections, fields) = fields?;
+    enter(&fields, &mut scenarios, (&mut parameters, &mut unknowns));
     let mut about = about?;
     let own = (parameters.as_slice(), unknowns.as_slice(), fields.as_slice());
     let dependence = dependence(&dependence_sections, drawn, own, about.seed, root, problems)?;
@@ -267,19 +261,20 @@ fn structure(
     study.given = inputs::all_given(&study);
     study.hierarchy.trained = trained(&study, root);
     if let Some(node) = root.find("gap.companion") {
-        let own = problems.within("gap", |problems| {
-            problems.within("companion", |problems| companion(&study, node, problems))
-        });
-        study.gap.companion = Some(Box::new(own?));
+        study.gap.companion = Some(Box::new(companion_of(&study, node, problems)?));
     }
-    match resolved::table(&study, response?.as_ref(), &sections) {
-        Ok(resolved) => study.resolved = resolved,
-        Err(error) => {
-            problems.report(None, format!("the study with its defaults {error}"));
-            return None;
-        }
-    }
+    let resolved = resolved::table(&study, response?.as_ref(), &sections).map_err(|error| {
+        problems.report(None, format!("the study with its defaults {error}"));
+    });
+    study.resolved = resolved.ok()?;
     Some(study)
+}
+
+/// `[gap.companion]`.
+fn companion_of(study: &Study, node: &Node, problems: &mut Problems) -> Option<Companion> {
+    problems.within("gap", |problems| {
+        problems.within("companion", |problems| companion(study, node, problems))
+    })
 }
 
 /// Third layer: what the plugins need of the machine.

@@ -1,5 +1,4 @@
-//! Made-up results with the shape, the units and the magnitudes of the mercury target study
-//! (Radaideh et al., arXiv 2202.03959); no number in it is a result.
+//! Made-up results with the shape, units and sizes of the mercury target study (Radaideh et al., arXiv 2202.03959).
 
 use lacuna::data::{Axis, FailedRun, Layout, Measurements, Parameter, Replicate, Unit};
 use lacuna::math::distribution::Distribution;

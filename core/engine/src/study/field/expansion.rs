@@ -68,7 +68,9 @@ impl Expansion {
             let highest = row.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
             let peak = row.iter().find(|x| x.abs() >= 0.5 * highest);
             if peak.is_some_and(|peak| *peak < 0.0) {
-                row.iter_mut().for_each(|x| *x = -*x);
+                for x in row {
+                    *x = -*x;
+                }
             }
         }
         Ok(Self { kept: values.iter().sum::<f64>() / total, values, functions })

@@ -13,12 +13,14 @@ mod keys;
 use std::path::Path;
 use std::sync::Arc;
 
-use lacuna::data::{Axis, Coordinates, Field, Parameter, Unit};
+use lacuna::data::{Axis, Coordinates, Field, Parameter, Scenario, Unit};
 use lacuna::expression::{Fault, Scope};
 use lacuna::math::distribution::Distribution;
+use lacuna::text::values::OpenFraction;
 use lacuna::text::{Complaints, Node, Problems};
 use lacuna_linalg::Matrix;
 
+use super::sections;
 use super::unknowns::Unknown;
 use expansion::{Expansion, Keep};
 
@@ -34,14 +36,14 @@ const TABLE: &str = "level";
 /// Share of the variance that is kept if the study states none.
 const VARIANCE: f64 = 0.95;
 
-/// The fields of all sections; `None` after reporting an error.
+/// The fields of all sections, beside these; `None` after reporting an error.
 pub(super) fn fields(
-    sections: &[FieldSection],
-    directory: &Path,
     root: &Node,
+    directory: &Path,
     problems: &mut Problems,
-) -> Option<Vec<Arc<Field>>> {
+) -> Option<(Vec<FieldSection>, Vec<Arc<Field>>)> {
     let before = problems.len();
+    let sections = sections::fields(root, problems)?;
     let mut complaints = Complaints::new(root, problems);
     let mut fields = Vec::new();
     for (i, section) in sections.iter().enumerate() {
@@ -54,7 +56,7 @@ pub(super) fn fields(
         }
         fields.extend(field(section, directory, &mut complaints).map(Arc::new));
     }
-    (problems.len() == before).then_some(fields)
+    (problems.len() == before).then_some((sections, fields))
 }
 
 /// The axis of the places; `None` after reporting an error.
@@ -114,7 +116,7 @@ fn keep(section: &FieldSection, places: usize, complaints: &mut Complaints<'_>) 
             None
         }
         (Some(terms), None) => Some(Keep::Terms(terms.get())),
-        (None, variance) => Some(Keep::Variance(variance.map_or(VARIANCE, |share| share.get()))),
+        (None, variance) => Some(Keep::Variance(variance.map_or(VARIANCE, OpenFraction::get))),
     }
 }
 
@@ -211,11 +213,17 @@ impl Level {
     }
 }
 
-/// The coefficients of fields as parameters, with their unknowns.
-pub(super) fn coefficients(fields: &[Arc<Field>]) -> Vec<(Parameter, Unknown)> {
-    let one = |name: String| {
-        let parameter = Parameter::plain(&name, Distribution::Normal([0.0, 1.0]));
-        (parameter, Unknown { of_field: true, ..Unknown::shared(&name) })
-    };
-    fields.iter().flat_map(|field| field.coefficients()).map(one).collect()
+/// Adds fields to the conditions, and their coefficients to the parameters and their unknowns.
+pub(super) fn enter(
+    fields: &[Arc<Field>],
+    scenarios: &mut [Scenario],
+    (parameters, unknowns): (&mut Vec<Parameter>, &mut Vec<Unknown>),
+) {
+    for scenario in scenarios {
+        scenario.fields = fields.to_vec();
+    }
+    for name in fields.iter().flat_map(|field| field.coefficients()) {
+        parameters.push(Parameter::plain(&name, Distribution::Normal([0.0, 1.0])));
+        unknowns.push(Unknown { of_field: true, ..Unknown::shared(&name) });
+    }
 }
