@@ -94,7 +94,7 @@ mod tests {
     fn a_variance_above_three_asks_for_more_runs() {
         assert_eq!(variance(Some(3.0), 10), None);
         let found = variance(Some(5.1), 10).map(|finding| finding.message).unwrap_or_default();
-        assert!(found.contains("3 times as many"), "{found}");
+        assert!(found.contains("3.00 times as many"), "{found}");
         assert!(variance(None, 10).is_some_and(|finding| finding.figure.is_none()));
         assert_eq!(sticking(0.05), None);
         assert!(sticking(0.051).is_some());

@@ -13,6 +13,7 @@ use lacuna::math::moments;
 use lacuna::math::random::{permutation, uniform};
 use lacuna::plugin::{Fact, Target};
 use lacuna::run::{Progress, Stop, files};
+use lacuna::text::values::Count;
 use lacuna_linalg::{Matrix, least_squares};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -22,6 +23,8 @@ use super::{Calibrated, LikelihoodEstimate, Outcome};
 use crate::posterior::CutValues;
 use crate::stage::predict::spaced;
 
+/// Number of imputations if the study states none.
+const IMPUTATIONS: usize = 40;
 /// Number of chains over which the pooled draws are distributed.
 const HANDS: usize = 4;
 /// Number of pooled draws, if the chains have so many.
@@ -53,7 +56,7 @@ pub(super) fn sample_cut(
         let text = "all unknowns are cut, and nothing is left that the data could determine";
         return Err(Stop::new(text).help("take `cut` out of at least one parameter"));
     }
-    let count = section.common.imputations.get();
+    let count = section.common.imputations.map_or(IMPUTATIONS, Count::get);
     let values = cut_values(asked, places, count);
     let nothing = CutValues { places: places.to_vec(), values: Vec::new() };
     let remaining = nothing.rest(posterior.parameters());
@@ -212,13 +215,13 @@ impl Pool<'_> {
         let before = self.places.iter().filter(|&&place| place < coordinate).count();
         let cut = self.places.iter().position(|&place| place == coordinate);
         // Values of each imputation, and the effective number of them.
-        let values = |number: usize| match cut {
-            Some(k) => (vec![self.values[(number, k)]], f64::INFINITY),
-            None => {
-                let j = coordinate - before;
-                let size = self.all[number].outcome.diagnosis.coordinates[j].ess_bulk;
-                (self.kept(number).pooled(j), size)
+        let values = |number: usize| {
+            if let Some(k) = cut {
+                return (vec![self.values[(number, k)]], f64::INFINITY);
             }
+            let j = coordinate - before;
+            let size = self.all[number].outcome.diagnosis.coordinates[j].ess_bulk;
+            (self.kept(number).pooled(j), size)
         };
         let all: Vec<(Vec<f64>, f64)> = (0..count).map(values).collect();
         let centre =
@@ -280,7 +283,7 @@ impl Pool<'_> {
     fn doubts(&self) -> Vec<String> {
         let disagree = |own: &&Calibrated| {
             let diagnosis = &own.outcome.diagnosis;
-            diagnosis.coordinates.iter().any(|c| !(c.r_hat <= LARGEST_R_HAT))
+            diagnosis.coordinates.iter().any(|c| c.r_hat.is_nan() || c.r_hat > LARGEST_R_HAT)
         };
         let count = self.all.iter().filter(disagree).count();
         if count == 0 {

@@ -230,9 +230,9 @@ impl<'a> Estimated<'a> {
 
 /// Longest run of equal points of a chain, as a share of its steps.
 fn longest_stay(draws: &Draws) -> f64 {
-    let mut longest = 0;
+    let mut longest = 0_usize;
     for chain in 0..draws.chains {
-        let mut stay = 0;
+        let mut stay = 0_usize;
         for step in 0..draws.steps {
             let same = step > 0 && draws.point(chain, step) == draws.point(chain, step - 1);
             stay = if same { stay + 1 } else { 1 };
@@ -313,7 +313,9 @@ impl Target for Estimated<'_> {
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
         let mut slope = self.approximation.gap(point);
         self.approximation.factor.solve(&mut slope);
-        slope.iter_mut().for_each(|s| *s = -*s);
+        for s in &mut slope {
+            *s = -*s;
+        }
         (self.approximation.log_density(point), slope)
     }
 

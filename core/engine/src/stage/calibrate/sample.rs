@@ -38,13 +38,12 @@ pub(super) fn sample(
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
     let search = random.named("optimise");
     let estimated = posterior.runs().map(|_| Estimated::search(posterior, &search)).transpose()?;
-    let mut maxima = match &estimated {
-        Some(estimated) => vec![estimated.maximum()?],
-        None => {
-            let maxima = maxima(posterior, &asked.stated, &search);
-            sampling::broken(posterior)?;
-            maxima?
-        }
+    let mut maxima = if let Some(estimated) = &estimated {
+        vec![estimated.maximum()?]
+    } else {
+        let maxima = maxima(posterior, &asked.stated, &search);
+        sampling::broken(posterior)?;
+        maxima?
     };
     let adapted = population::adapted(study, posterior, &mut maxima)?;
     let posterior = adapted.as_ref().unwrap_or(posterior);

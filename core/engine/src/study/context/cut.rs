@@ -1,9 +1,9 @@
 //! Parameters that the data do not update.
 
 use lacuna::text::Complaints;
+use lacuna::text::values::Count;
 
 use crate::study::Study;
-use crate::study::file::SamplerKeys;
 
 /// Fewest values of the cut parameters.
 const FEWEST: usize = 10;
@@ -22,9 +22,7 @@ pub(super) fn check(study: &Study, complaints: &mut Complaints<'_>) {
     let cut = study.cut();
     let Some(&first) = cut.first() else {
         let section = study.sampler.as_ref();
-        if section
-            .is_some_and(|section| section.common.imputations != SamplerKeys::default().imputations)
-        {
+        if section.is_some_and(|section| section.common.imputations.is_some()) {
             complaints
                 .at("sampler.imputations")
                 .say("no parameter is cut, so that there is nothing to impute")
@@ -68,7 +66,8 @@ pub(super) fn check(study: &Study, complaints: &mut Complaints<'_>) {
             .say(format!("`cut` cannot be combined with {what}"))
             .expected("one of the two");
     }
-    let imputations = study.sampler.as_ref().map(|section| section.common.imputations.get());
+    let imputations = study.sampler.as_ref().and_then(|section| section.common.imputations);
+    let imputations = imputations.map(Count::get);
     if let Some(count) = imputations.filter(|count| *count < FEWEST) {
         complaints
             .at("sampler.imputations")

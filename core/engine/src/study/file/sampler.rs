@@ -20,19 +20,9 @@ pub struct SamplerKeys {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stop: Option<StopRule>,
     /// Number of values of the parameters with `cut`, at least 10; the other parameters are sampled for each of them.
-    #[serde(skip_serializing_if = "is_customary")]
-    pub imputations: Count,
-}
-
-/// Number of imputations if the study states none.
-const IMPUTATIONS: usize = 40;
-
-fn imputations() -> Count {
-    Count::new(IMPUTATIONS).unwrap_or_else(|_| unreachable!("a number above zero"))
-}
-
-fn is_customary(imputations: &Count) -> bool {
-    imputations.get() == IMPUTATIONS
+    /// Default: 40.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub imputations: Option<Count>,
 }
 
 /// Stopping rule of a sampler.
@@ -50,6 +40,6 @@ pub struct StopRule {
 impl Default for SamplerKeys {
     fn default() -> Self {
         let burn_in = Fraction::new(0.5).unwrap_or_else(|_| unreachable!("0.5 is a fraction"));
-        Self { burn_in, start: None, stop: None, imputations: imputations() }
+        Self { burn_in, start: None, stop: None, imputations: None }
     }
 }
