@@ -8,6 +8,7 @@ use std::path::Path;
 use lacuna_engine::report::summary_text;
 use lacuna_engine::stage::simulator::Simulator;
 use lacuna_engine::study::Study;
+use lacuna_linalg::{Cholesky, Matrix};
 use serde_json::Value;
 
 use crate::quick;
@@ -22,24 +23,9 @@ fn list(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
 }
 
-/// Solves `A x = b` by elimination with pivots.
-fn solved(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
-    let n = b.len();
-    for k in 0..n {
-        let pivot = (k..n).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs())).unwrap();
-        a.swap(k, pivot);
-        b.swap(k, pivot);
-        for i in k + 1..n {
-            let factor = a[i][k] / a[k][k];
-            for j in k..n {
-                a[i][j] -= factor * a[k][j];
-            }
-            b[i] -= factor * b[k];
-        }
-    }
-    for k in (0..n).rev() {
-        b[k] = (b[k] - (k + 1..n).map(|j| a[k][j] * b[j]).sum::<f64>()) / a[k][k];
-    }
+/// Solves `A x = b` for a covariance `A`.
+fn solved(a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
+    Cholesky::new(&Matrix::from_rows(b.len(), a)).unwrap().solve(&mut b);
     b
 }
 

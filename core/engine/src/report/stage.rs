@@ -159,7 +159,7 @@ fn inputs(study: &Study) -> Vec<RunInput> {
     let by_group = study.hierarchy.trained.is_some();
     let of = |(i, parameter): (usize, &Parameter)| {
         let name = &trained.unknowns[i].name;
-        let places = || study.unknowns.iter().enumerate().filter(|(_, u)| !u.of_population);
+        let places = || study.unknowns.iter().enumerate().filter(|(_, u)| !u.of_population());
         RunInput {
             name: parameter.name.clone(),
             symbol: parameter.symbol.clone(),

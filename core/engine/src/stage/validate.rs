@@ -137,7 +137,7 @@ impl Work<'_> {
         let mut cases = vec![self.case("map", &calibrated.outcome.map[..d], &mut failed)?];
         if self.study.validate.against == Some(Against::Reference) {
             // The reference of a field is its mean or median.
-            let of_fields = |unknown: &Unknown| unknown.of_field.then_some(0.0);
+            let of_fields = |unknown: &Unknown| unknown.of_field().then_some(0.0);
             let both = self.study.parameters.iter().zip(&self.study.unknowns);
             let point: Vec<f64> = both
                 .filter_map(|(p, unknown)| p.reference.or_else(|| of_fields(unknown)))

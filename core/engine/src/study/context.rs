@@ -201,7 +201,7 @@ fn parameters(study: &Study, complaints: &mut Complaints<'_>) {
                 .say(format!("there are two parameters `{}`", parameter.name))
                 .help("give each `[[parameter]]` its own name");
         }
-        if study.surrogate.is_some() && !study.unknowns[i].of_population {
+        if study.surrogate.is_some() && !study.unknowns[i].of_population() {
             let population = study.dependence.population_of(i);
             let path = match population {
                 Some(population) => format!("parameter.{}.population", population.name),
@@ -301,7 +301,8 @@ fn validation(study: &Study, complaints: &mut Complaints<'_>) {
     if study.validate.against.is_some() {
         let scale = |j: usize| study.dependence.populations.iter().any(|p| p.scale == j);
         let without = study.parameters.iter().enumerate().filter(|(_, p)| p.reference.is_none());
-        for (_, parameter) in without.filter(|(j, _)| !scale(*j) && !study.unknowns[*j].of_field) {
+        for (_, parameter) in without.filter(|(j, _)| !scale(*j) && !study.unknowns[*j].of_field())
+        {
             complaints
                 .at("validate.against")
                 .say(format!("the parameter `{}` has no `reference`", parameter.name))

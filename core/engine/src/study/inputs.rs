@@ -109,7 +109,7 @@ pub(super) fn all_given(study: &Study) -> Vec<Given> {
     let computed = study.computed(0).ok().flatten();
     let by_coefficients = study.model_takes_fields();
     for (parameter, unknown) in study.parameters.iter().zip(&study.unknowns) {
-        if by_coefficients || !unknown.of_field {
+        if by_coefficients || !unknown.of_field() {
             add(&unknown.name, Some(&parameter.unit));
         }
     }

@@ -27,7 +27,7 @@ pub(super) fn table(
     let first = |(j, (_, unknown)): &(usize, (&Parameter, &Unknown))| {
         let again = unknown.member.is_some()
             && study.unknowns[..*j].iter().any(|other| other.name == unknown.name);
-        !again && !unknown.of_population && !unknown.of_field
+        !again && !unknown.of_population() && !unknown.of_field()
     };
     let parameters: Result<Vec<Table>, _> = study
         .parameters

@@ -27,7 +27,7 @@ pub(super) fn check(
     let mut set_by_fields = BTreeSet::new();
     field::check(study, signature, &mut set_by_fields, complaints);
     for (parameter, unknown) in study.parameters.iter().zip(&study.unknowns) {
-        if !unknown.acts_in(scenario) || unknown.of_field {
+        if !unknown.acts_in(scenario) || unknown.of_field() {
             continue;
         }
         let path = format!("parameter.{}", unknown.name);

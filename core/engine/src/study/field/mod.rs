@@ -21,7 +21,7 @@ use lacuna::text::{Complaints, Node, Problems};
 use lacuna_linalg::Matrix;
 
 use super::sections;
-use super::unknowns::Unknown;
+use super::unknowns::{Unknown, UnknownKind};
 use expansion::{Expansion, Keep};
 
 pub(super) use check::check;
@@ -224,6 +224,6 @@ pub(super) fn enter(
     }
     for name in fields.iter().flat_map(|field| field.coefficients()) {
         parameters.push(Parameter::plain(&name, Distribution::Normal([0.0, 1.0])));
-        unknowns.push(Unknown { of_field: true, ..Unknown::shared(&name) });
+        unknowns.push(Unknown { kind: UnknownKind::Field, ..Unknown::shared(&name) });
     }
 }
