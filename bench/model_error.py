@@ -29,7 +29,8 @@ PARTICLES = '[sampler]\nuse = "sequential_monte_carlo"\nparticles = 200\n'
 class Case:
     """A problem: its study without discrepancy, effects and sampler, its data, and what it is to predict."""
 
-    study: str
+    # The text, or the text for each data set.
+    study: str | Callable[[int], str]
     data: Callable[[int], str]
     # True value of each parameter or quantity for a data set, in the order of the table.
     truth: Callable[[int], dict]
@@ -96,6 +97,47 @@ def machine():
     )
     truth = {"efficiency": 0.65, "beyond": work(5.9)}
     return Case(text, data, lambda _: truth, {name: own + sampler for name, own in variants.items()})
+
+
+# The same with an experiment without losses that measured the efficiency to 0.65 +- 0.02: modular and full Bayes.
+
+
+def modular():
+    measured = 0.2 + 0.38 * np.arange(11)
+
+    def elsewhere(number):
+        return 0.65 + 0.02 * np.random.default_rng([2009, number]).standard_normal()
+
+    def data(number):
+        y = work(measured) + 0.01 * np.random.default_rng([2014, number]).standard_normal(11)
+        return table("effort,y", [*measured, *(0.2 + 0.38 * np.arange(11, 16))], [*y, *[None] * 5])
+
+    def text(number):
+        return study(
+            {"efficiency": f"{{ normal = [{elsewhere(number):.10g}, 0.02] }}"},
+            'effort = { first = 0.2, last = 5.9, count = 16, unit = "1" }',
+            "efficiency * effort",
+            {"beyond": 'use = "at"\nplace = 5.9'},
+        )
+
+    process = [
+        "bias = { half_normal = 0.5 }",
+        "correlation_length = { log_normal = [0.7, 0.7] }",
+        "variance = { known = 1e-4 }",
+    ]
+    sampler = ENSEMBLE.format(walkers=12, steps=1000)
+    free = discrepancy("gaussian", "variance = { half_normal = 0.1 }") + sampler
+    known = discrepancy("gaussian", "variance = { known = 1e-4 }") + sampler
+    smooth = discrepancy("gaussian_process", "orthogonal = false", *process) + sampler
+    variants = {
+        "full, gaussian": known,
+        "full, gaussian, noise unknown": free,
+        "full, gaussian_process, not orthogonal": smooth,
+        "cut, gaussian, noise unknown": free,
+        "cut, gaussian_process, not orthogonal": smooth,
+    }
+    truth = {"efficiency": 0.65, "beyond": work(5.9)}
+    return Case(text, data, lambda _: truth, variants)
 
 
 # The same with the efficiency known from elsewhere: the adjustments of Joseph and Melkote, J. Quality Technology 41 (2009) 362.
@@ -227,10 +269,10 @@ def warp(sets):
     return Case(text, data, truth, variants)
 
 
-def distance(tolerance, *options):
+def distance(tolerance, *options, metric="wasserstein"):
     return discrepancy(
         "approximate_bayesian_computation",
-        'metric = "wasserstein"',
+        f'metric = "{metric}"',
         f"tolerance = {{ known = {tolerance} }}",
         "simulations = 50",
         *options,
@@ -278,28 +320,80 @@ def quantile(z, location=3.0, scale=1.0, skewness=2.0, kurtosis=0.5):
     return location + scale * (1 + 0.8 * np.tanh(skewness * z / 2)) * (1 + z * z) ** kurtosis * z
 
 
+HIGH = float(norm.ppf(0.99))
+QUANTILES = {"location": 3.0, "scale": 1.0, "skewness": 2.0, "kurtosis": 0.5, "high": float(quantile(HIGH))}
+
+
+def with_quantiles(z):
+    """The study whose response is these quantiles."""
+    formula = "location + scale * (1 + 0.8 * tanh(skewness * {z} / 2)) * (1 + {z}^2)^kurtosis * {z}"
+    grid = ", ".join(f"{x:.10g}" for x in z)
+    return study(
+        {name: "{ uniform = [0.0, 10.0] }" for name in ("location", "scale", "skewness", "kurtosis")},
+        f'z = {{ values = [{grid}], unit = "1" }}',
+        formula.format(z="z"),
+        {"high": f'use = "expression"\nformula = "{formula.format(z=repr(HIGH))}"'},
+    )
+
+
 def sample():
     z = norm.ppf((np.arange(100) + 0.5) / 100)
 
     def data(number):
         return table("z,y", z, quantile(np.random.default_rng(500 + number).standard_normal(100)))
 
-    formula = "location + scale * (1 + 0.8 * tanh(skewness * {z} / 2)) * (1 + {z}^2)^kurtosis * {z}"
-    high = float(norm.ppf(0.99))
     sampler = ENSEMBLE.format(walkers=40, steps=1500)
     variants = {
         "gaussian": discrepancy("gaussian", "variance = { half_normal = 10.0 }") + sampler,
         "approximate_bayesian_computation": distance(0.15, "sample = true", "variance = { known = 1e-6 }") + PARTICLES,
     }
-    grid = ", ".join(f"{x:.10g}" for x in z)
-    names = ["location", "scale", "skewness", "kurtosis"]
+    return Case(with_quantiles(z), data, lambda _: QUANTILES, variants)
+
+
+# The distances beside each other: 40 draws of that distribution, with a quarter of the median distance between two such
+# samples as the tolerance.
+
+
+def distances():
+    z = norm.ppf((np.arange(40) + 0.5) / 40)
+
+    def data(number):
+        return table("z,y", z, quantile(np.random.default_rng(700 + number).standard_normal(40)))
+
+    options = ["sample = true", "variance = { known = 1e-6 }"]
+    tolerances = {"wasserstein": 0.13, "energy": 0.07, "maximum_mean_discrepancy": 0.034, "jensen_shannon": 0.05}
+    variants = {
+        metric: distance(tolerance, *options, metric=metric) + PARTICLES for metric, tolerance in tolerances.items()
+    }
+    return Case(with_quantiles(z), data, lambda _: QUANTILES, variants)
+
+
+# One record of a peak that comes at a random time, as points of a plane; the tolerance is the median distance at the truth.
+
+
+def late():
+    times = np.linspace(0, 10, 31)
+
+    def data(number):
+        rng = np.random.default_rng(900 + number)
+        y = 2 * np.exp(-0.5 * ((times - 5 - rng.normal(0, 0.3)) / 0.7) ** 2)
+        return table("time,y", times, y + 0.05 * rng.standard_normal(31))
+
+    options = ["axis_weight = 3.0", "variance = { known = 0.0025 }"]
+    tolerances = {"wasserstein": 0.062, "energy": 0.087, "maximum_mean_discrepancy": 0.037, "jensen_shannon": 0.26}
+    own = {"maximum_mean_discrepancy": ["bandwidth = 1.0"]}
+    variants = {"gaussian": discrepancy("gaussian", "variance = { known = 0.0025 }") + PARTICLES}
+    variants |= {
+        metric: distance(tolerance, *options, *own.get(metric, []), metric=metric) + PARTICLES
+        for metric, tolerance in tolerances.items()
+    }
     text = study(
-        {name: "{ uniform = [0.0, 10.0] }" for name in names},
-        f'z = {{ values = [{grid}], unit = "1" }}',
-        formula.format(z="z"),
-        {"high": f'use = "expression"\nformula = "{formula.format(z=repr(high))}"'},
+        {"height": "{ uniform = [0.0, 5.0] }", "width": "{ uniform = [0.2, 3.0] }"},
+        'time = { first = 0.0, last = 10.0, count = 31, unit = "1" }',
+        "height * exp(-0.5 * ((time - 5) / width)^2)",
+        {},
     )
-    truth = {**dict(zip(names, (3.0, 1.0, 2.0, 0.5))), "high": float(quantile(high))}
+    truth = {"height": 2.0, "width": 0.7}
     return Case(text, data, lambda _: truth, variants)
 
 
@@ -370,6 +464,14 @@ def judged(summary, truth):
     return [(q["q025"] <= value <= q["q975"], q["q975"] - q["q025"], q["mean"]) for q, value in found]
 
 
+def adapted(text, variant):
+    """The study of a variant: some of them cut the first parameter."""
+    if not variant.startswith("cut"):
+        return text
+    first = text.index("prior = ")
+    return text[:first] + "cut = true\n" + text[first:]
+
+
 def show(program, case, sets, only, folder):
     variants = {name: own for name, own in case.variants.items() if not only or name in only}
     jobs = [(name, number) for name in variants for number in range(sets)]
@@ -377,7 +479,8 @@ def show(program, case, sets, only, folder):
     def one(job):
         name, number = job
         place = folder / name.replace(",", "").replace(" ", "-") / str(number)
-        return run(program, place, case.study + "\n" + variants[name], case.data(number), number)
+        text = case.study if isinstance(case.study, str) else case.study(number)
+        return run(program, place, adapted(text, name) + "\n" + variants[name], case.data(number), number)
 
     with ThreadPoolExecutor() as pool:
         results = dict(zip(jobs, pool.map(one, jobs)))
@@ -403,7 +506,7 @@ def show(program, case, sets, only, folder):
 
 
 def main():
-    cases = ["machine", "tangent", "warp", "adjustments", "peaks", "sample"]
+    cases = ["machine", "modular", "tangent", "warp", "adjustments", "peaks", "sample", "distances", "late"]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("lacuna")
     parser.add_argument("--case", nargs="+", choices=cases, default=cases)
@@ -413,11 +516,14 @@ def main():
     asked = parser.parse_args()
     made = {
         "machine": machine,
+        "modular": modular,
         "tangent": tangent,
         "warp": lambda: warp(asked.sets),
         "adjustments": adjustments,
         "peaks": peaks,
         "sample": sample,
+        "distances": distances,
+        "late": late,
     }
     with tempfile.TemporaryDirectory() as temporary:
         folder = (asked.out or Path(temporary)).resolve()

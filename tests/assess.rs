@@ -108,6 +108,7 @@ fn every_finding_is_provoked_by_a_study() {
         "predict.rs",
         "hierarchy/trained.rs",
         "intervals.rs",
+        "stochastic.rs",
     ];
     let here = ["assess/data.rs", "assess/draws.rs", "assess/runs.rs"];
     let read = |file: &&str| fs::read_to_string(quick::root().join("tests").join(file)).unwrap();
@@ -116,6 +117,7 @@ fn every_finding_is_provoked_by_a_study() {
         let seen = [
             format!("\"{code}\", Severity::"),
             format!("of_code(\"{code}\")"),
+            format!("of_code(&findings, \"{code}\")"),
             format!("contains(\"{code}\")"),
         ];
         seen.iter().any(|call| text.contains(call))

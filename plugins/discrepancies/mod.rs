@@ -8,8 +8,10 @@ pub mod embedded;
 pub mod gaussian;
 pub mod gaussian_process;
 pub mod multiplicative_gaussian;
+pub mod pseudo_marginal;
 pub mod scaled_gaussian_process;
 pub mod student_t;
+pub mod synthetic_likelihood;
 
 #[cfg(test)]
 mod tests;

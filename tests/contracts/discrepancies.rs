@@ -60,6 +60,11 @@ fn they_keep_their_contract() {
         "relative = { half_normal = 1.0 }\nby = \"sensor\"\nfloor = { half_normal = 1.0 }",
         "relative = { known = 0.1 }\nfloor = { known = 0.1 }",
     ];
+    let pseudo_marginal = &[
+        "variance = { half_normal = 1.0 }",
+        "variance = { half_normal = 1.0 }\nby = \"sensor\"\nindependent_by = \"sensor\"",
+        "variance = { known = 0.04 }\nsimulations = 3",
+    ];
     let scaled_gaussian_process = &[
         "bias = { half_normal = 1.0 }\ncorrelation_length = { log_normal = [-8, 1] }\n\
          variance = { half_normal = 1.0 }",
@@ -71,6 +76,11 @@ fn they_keep_their_contract() {
         "scale = { half_normal = 1.0 }\nby = \"sensor\"\ndegrees_of_freedom = { known = 5 }",
         "scale = { known = 0.2 }\ncommon = { share = 0.9, most = 1 }",
     ];
+    // Without a noise of its own it has no likelihood of a single response.
+    let synthetic_likelihood = &[
+        "variance = { half_normal = 1.0 }",
+        "variance = { known = 0.04 }\nby = \"sensor\"\nestimator = \"plug_in\"",
+    ];
     let table: &Table = &[
         ("approximate_bayesian_computation", approximate_bayesian_computation),
         ("autoregressive", autoregressive),
@@ -79,10 +89,12 @@ fn they_keep_their_contract() {
         ("gaussian", gaussian),
         ("gaussian_process", gaussian_process),
         ("multiplicative_gaussian", multiplicative_gaussian),
+        ("pseudo_marginal", pseudo_marginal),
         ("scaled_gaussian_process", scaled_gaussian_process),
         // Example of CONTRIBUTING.md.
         ("shot_noise", &["gain = { half_normal = 0.1 }"]),
         ("student_t", student_t),
+        ("synthetic_likelihood", synthetic_likelihood),
     ];
     all::<dyn Discrepancy>(table, |case, plugin| lacuna_contract::discrepancy(&case.label, plugin));
 }

@@ -77,6 +77,16 @@ pub fn find_gap(
 /// Refuses dependent priors, whose curvature the Gauss-Newton fits of the search do not contain, and parameters by group with a
 /// surrogate, of which the search trains others.
 fn independent(study: &Study) -> Result<(), Stop> {
+    if !study.cut().is_empty() {
+        let text = "the search for missing physics fits all parameters to the data";
+        return Err(Stop::new(text).help("search with a copy of the study without `cut`"));
+    }
+    if study.is_stochastic() {
+        let text = "the search for missing physics needs a response that the parameters determine";
+        return Err(
+            Stop::new(text).help("search with a copy of the study that has a `[surrogate]`")
+        );
+    }
     if !study.dependence.populations.is_empty() || study.hierarchy.trained.is_some() {
         let text = "the search for missing physics does not know populations, nor parameters by group with a surrogate";
         return Err(Stop::new(text).help(

@@ -252,7 +252,7 @@ impl RunDirectory {
     }
 
     /// Hash of a stage's inputs and of the code that makes its result.
-    pub(super) fn hash_of(&self, stage: &Folder, inputs: &impl Serialize) -> Result<String, Stop> {
+    pub fn hash_of(&self, stage: &Folder, inputs: &impl Serialize) -> Result<String, Stop> {
         Ok(Asked::of(stage, inputs, &self.version)?.whole)
     }
 

@@ -89,7 +89,7 @@ impl Stage {
             Self::Evidence => (6, "evidence", OnVersion(3)),
             Self::Validate => (6, "validate", OnVersion(5)),
             Self::Quantities => (6, "quantities", OnVersion(2)),
-            Self::Reliability => (6, "reliability", OnVersion(2)),
+            Self::Reliability => (6, "reliability", OnVersion(3)),
             Self::Assess => (6, "assess", OnVersion(7)),
             Self::Gap => (7, "gap", OnVersion(4)),
             Self::Show => (7, "show", OnVersion(1)),

@@ -11,7 +11,7 @@ mod tests;
 use lacuna::data::{Layout, Unit};
 use lacuna::math::random::Stream;
 use lacuna::plugin::component::{Component, Context};
-use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
+use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise, StochasticModel};
 use lacuna::run::Stop;
 use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
@@ -211,6 +211,10 @@ impl Discrepancy for ApproximateBayesianComputation {
         let common = common_draws(known.common, size, &stream.named("common"));
         let sample = self.sample;
         Ok(Box::new(Approximate { noise, replicates, hyper, tolerance, sets, common, sample }))
+    }
+
+    fn stochastic_model(&self) -> StochasticModel {
+        StochasticModel::Taken
     }
 
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {

@@ -42,6 +42,8 @@ fn same(a: &Names, b: &Names) -> bool {
         && a.inputs == b.inputs
         && a.functions.len() == b.functions.len()
         && a.functions.iter().zip(&b.functions).all(|(a, b)| Arc::ptr_eq(a, b))
+        && a.fields.len() == b.fields.len()
+        && a.fields.iter().zip(&b.fields).all(|(a, b)| Arc::ptr_eq(a, b))
 }
 
 impl Clone for Kept {

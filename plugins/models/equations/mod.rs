@@ -73,7 +73,7 @@ pub use options::{Formula, Method, Observe, Solver, State, StateTable};
 /// Expressions use the parameters of the study, `fixed` values and the values of scenarios by their names, the
 /// states, the definitions of `where`, and the response's numeric axes: the axis is the time, here `t`. Tables of a
 /// scenario, such as a measured force, are called as functions: `force(t)`, interpolated between their points as
-/// the scenario states, with constant values beyond the first and the last. An axis of labels names the observed quantities:
+/// the scenario states, with constant values beyond the first and the last; so are random fields (`[[field]]`). An axis of labels names the observed quantities:
 /// `observe = { position = "x", speed = "abs(v)" }`. Without states the response is the expression at each point of
 /// its axes.
 ///
@@ -128,6 +128,7 @@ impl Equations {
             variables: Names::variables(call.layout),
             inputs: call.names.to_vec(),
             functions: call.scenario.functions.clone(),
+            fields: call.scenario.fields.clone(),
         };
         self.kept.get(&names, || System::compile(self, &names)).map_err(|faults| {
             let lines = faults.into_iter().map(|(option, fault)| {
@@ -200,6 +201,10 @@ impl Model for Equations {
             layout: Layout { unit, ..check::layout(self, context.layout) },
             resamples: true,
         }
+    }
+
+    fn takes_fields(&self) -> bool {
+        true
     }
 
     fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError> {

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use lacuna::data::{Axis, Coordinates, Function, Layout};
+use lacuna::data::{Axis, Coordinates, Field, Function, Layout};
 use lacuna::expression::{Break, Evaluator, Fault, Program, Scope, is_name};
-use lacuna::plugin::Context;
+use lacuna::plugin::{Context, Given};
 
 use super::Equations;
 
@@ -17,6 +17,8 @@ pub struct Names {
     pub inputs: Vec<String>,
     /// Tables that are called as functions.
     pub functions: Vec<Arc<Function>>,
+    /// Random fields that are called as functions; their coefficients are inputs.
+    pub fields: Vec<Arc<Field>>,
 }
 
 /// Name of the option for the start time.
@@ -58,17 +60,21 @@ impl Names {
 
     /// Returns the names of a study. A name that cannot be written in an expression is left out.
     pub fn of(context: &Context<'_>) -> Self {
+        let scenario = context.scenarios.first();
+        let fields = scenario.map(|scenario| scenario.fields.clone()).unwrap_or_default();
+        let coefficients: Vec<String> = fields.iter().flat_map(|f| f.coefficients()).collect();
         let mut inputs: Vec<String> = Vec::new();
-        for given in context.given.iter().filter(|given| is_name(&given.name)) {
-            if !inputs.contains(&given.name) {
-                inputs.push(given.name.clone());
+        for Given { name, .. } in context.given {
+            let usable = is_name(name) || coefficients.contains(name);
+            if usable && !inputs.contains(name) {
+                inputs.push(name.clone());
             }
         }
-        let scenario = context.scenarios.first();
         Self {
             variables: Self::variables(context.layout),
             inputs,
             functions: scenario.map(|scenario| scenario.functions.clone()).unwrap_or_default(),
+            fields,
         }
     }
 }
@@ -80,6 +86,9 @@ pub fn scope(equations: &Equations, names: &Names) -> Result<Scope, Vec<Located>
     let mut note = |option: String, outcome: Result<(), Fault>| {
         faults.extend(outcome.err().map(|fault| (option, fault)));
     };
+    for field in &names.fields {
+        note(String::new(), scope.field(field.clone()));
+    }
     for name in names.variables.iter().chain(&names.inputs) {
         note(String::new(), scope.unknown(name));
     }

@@ -136,7 +136,8 @@ fn place(text: &str, range: Range<usize>) -> Result<Place, String> {
     };
     let start = range.start + (name.len() - name.trim_start().len());
     let name = name.trim();
-    let letters = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+    // Brackets: the values of a field at its places are `name[1]` and so on.
+    let letters = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '[' | ']');
     if name.is_empty() || !name.chars().all(letters) {
         return Err(format!(
             "expected a name between `{{{{` and `}}}}`, found `{}`",

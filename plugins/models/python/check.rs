@@ -133,10 +133,18 @@ fn names(
     }
 }
 
+/// Argument that an input is passed with: its name; the values of a field, `name[1]` and so on, are one argument.
+fn argument(input: &str) -> &str {
+    input.split_once('[').map_or(input, |(base, _)| base)
+}
+
 impl Arguments {
     /// Complains of inputs that the function does not accept and of arguments that have no value.
     fn check(&self, key: &str, name: &str, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        let inputs = || context.given.iter().map(|given| given.name.as_str());
+        let mut arguments: Vec<&str> =
+            context.given.iter().map(|given| argument(&given.name)).collect();
+        arguments.dedup();
+        let inputs = || arguments.iter().copied();
         for input in inputs().filter(|input| !self.any && !self.takes(input)) {
             let free = || self.names.iter().map(String::as_str);
             let problem =

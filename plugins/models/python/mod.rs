@@ -39,13 +39,14 @@ use super::given;
 /// ```
 ///
 /// The function receives each input of the study (parameters, fixed values, values of a scenario) as an argument of
-/// that name, in the study's unit or in that of `units`. An argument `layout` receives the response's `name`, `unit`
+/// that name, in the study's unit or in that of `units`; a random field (`[[field]]`) is one argument, the list of its
+/// values at its places (a `numpy` array if the file imports `numpy`). An argument `layout` receives the response's `name`, `unit`
 /// and `axes` (each with `name`, and `labels` or `values` and `unit`); an argument `scenario` receives the scenario's
 /// `name`, `values` and `functions`. The function returns the response: an array or nested lists of the layout's
 /// shape, one flat list in row-major order, or dicts by label. Numbers are passed without rounding.
 ///
-/// With `vectorised` every input is a sequence with one value per run (a `numpy` array if the file imports `numpy`),
-/// and the function returns one response per run; its result for one run must not depend on the other runs.
+/// With `vectorised` every input is a sequence with one value per run (a `numpy` array if the file imports `numpy`;
+/// that of a field has the runs along its first axis), and the function returns one response per run; its result for one run must not depend on the other runs.
 ///
 /// Worker processes load the file once each; there are as many workers as concurrent runs. Output that the function
 /// prints does not affect the results. If the function raises an exception, exceeds the time limit or ends its
@@ -71,7 +72,8 @@ pub struct Python {
     #[serde(default = "hundred")]
     pub batch: Count,
     /// Name of a function in the same file that returns the derivatives of the response with respect to the inputs: a
-    /// dict with an array of the response's shape for each input, or one array with the inputs as an additional last
+    /// dict with an array of the response's shape for each input (with the places of a field as an additional last axis),
+    /// or one array with the inputs as an additional last
     /// axis. Without it, methods that use derivatives are not available for this model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gradient: Option<String>,

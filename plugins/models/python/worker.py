@@ -51,6 +51,18 @@ def explain(error, path):
     return message
 
 
+def grouped(names):
+    """Place of each argument among the inputs; of a field, whose values are `name[1]` and so on, a list of places."""
+    groups = {}
+    for place, name in enumerate(names):
+        base, bracket, _ = name.partition("[")
+        if bracket:
+            groups.setdefault(base, []).append(place)
+        else:
+            groups[name] = place
+    return groups
+
+
 class Function:
     """A function of the user's file and the arguments that it receives."""
 
@@ -172,31 +184,45 @@ def little_endian(values):
     return values.tobytes()
 
 
-def columns(value, axes, names):
+def columns(value, axes, groups, count):
     """Derivatives with one row per value of the response and one column per input."""
-    if isinstance(value, collections.abc.Mapping):
-        for name in names:
-            if name not in value:
-                raise Wrong(f"no derivatives by `{name}`")
-        parts = [array.array("d", flatten(value[name], axes)) for name in names]
+    if not isinstance(value, collections.abc.Mapping):
+        return flatten(value, axes + [{"name": "input", "length": count}])
+    parts = [None] * count
+    for name, places in groups.items():
+        if name not in value:
+            raise Wrong(f"no derivatives by `{name}`")
+        inner = [] if isinstance(places, int) else [{"name": name, "length": len(places)}]
+        part = array.array("d", flatten(value[name], axes + inner))
         if sys.byteorder == "big":
-            for part in parts:
-                part.byteswap()
-        return little_endian(array.array("d", (x for row in zip(*parts) for x in row)))
-    return flatten(value, axes + [{"name": "input", "length": len(names)}])
+            part.byteswap()
+        own = places if inner else [places]
+        for k, place in enumerate(own):
+            parts[place] = part[k :: len(own)]
+    return little_endian(array.array("d", (x for row in zip(*parts) for x in row)))
+
+
+def together(values, places):
+    """The values of a field: its places along the last axis."""
+    numpy = sys.modules.get("numpy")
+    own = [values[place] for place in places]
+    if numpy is not None:
+        return numpy.stack(own, axis=-1)
+    return [list(one) for one in zip(*own)] if isinstance(own[0], list) else own
 
 
 class Worker:
     def __init__(self, path, simulate, gradient, vectorised):
         self.path, self.vectorised = path, vectorised
         self.module = load(path)
-        self.names, self.axes, self.extra = [], [], {}
+        self.names, self.groups, self.axes, self.extra = [], {}, [], {}
         self.wanted = {"simulate": simulate, "gradient": gradient}
         self.functions = {}
 
     def prepare(self, request):
         """Stores the data that do not change from call to call."""
         self.names = request["names"]
+        self.groups = grouped(self.names)
         layout = request["layout"]
         self.axes = [
             {"name": a["name"], "labels": a.get("labels"), "length": len(a.get("labels") or a["values"])}
@@ -204,11 +230,13 @@ class Worker:
         ]
         self.extra = {"layout": layout, "scenario": request["scenario"]}
         self.functions = {
-            key: Function(self.module, name, self.names) for key, name in self.wanted.items() if name
+            key: Function(self.module, name, self.groups) for key, name in self.wanted.items() if name
         }
 
     def arguments(self, function, values):
-        arguments = dict(zip(self.names, values))
+        arguments = {}
+        for name, places in self.groups.items():
+            arguments[name] = values[places] if isinstance(places, int) else together(values, places)
         arguments.update((name, self.extra[name]) for name in function.extra)
         return arguments
 
@@ -237,7 +265,9 @@ class Worker:
     def gradient(self, rows):
         function = self.functions["gradient"]
         return b"".join(
-            columns(function.call(**self.arguments(function, row)), self.axes, self.names)
+            columns(
+                function.call(**self.arguments(function, row)), self.axes, self.groups, len(self.names)
+            )
             for row in rows
         )
 

@@ -156,6 +156,10 @@ impl Component for Hamiltonian {
 }
 
 impl Sampler for Hamiltonian {
+    fn uses_gradient(&self) -> bool {
+        true
+    }
+
     fn steps_are_draws(&self) -> bool {
         true
     }

@@ -88,6 +88,10 @@ impl Component for NoUTurn {
 }
 
 impl Sampler for NoUTurn {
+    fn uses_gradient(&self) -> bool {
+        true
+    }
+
     fn steps_are_draws(&self) -> bool {
         true
     }

@@ -155,6 +155,10 @@ impl Component for Variational {
 }
 
 impl Sampler for Variational {
+    fn uses_gradient(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         let steps = self.iterations;
         Plan { chains: self.paths, steps, warm_up: steps, ensemble: false }

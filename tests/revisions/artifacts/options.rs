@@ -1,7 +1,7 @@
 //! Options with which the plugins compute.
 
 /// Options of plugins without complete defaults, and of those whose defaults take long.
-pub const OPTIONS: [(&str, &str); 55] = [
+pub const OPTIONS: [(&str, &str); 57] = [
     (
         "discrepancy.approximate_bayesian_computation",
         "metric = \"energy\"\ntolerance = { known = 0.2 }\nvariance = { half_normal = 1 }",
@@ -27,11 +27,13 @@ pub const OPTIONS: [(&str, &str); 55] = [
         "discrepancy.multiplicative_gaussian",
         "relative = { half_normal = 1 }\nfloor = { known = 0.2 }",
     ),
+    ("discrepancy.pseudo_marginal", "variance = { half_normal = 1 }"),
     (
         "discrepancy.scaled_gaussian_process",
         "bias = { half_normal = 1 }\ncorrelation_length = { known = 2 }\nvariance = { half_normal = 1 }",
     ),
     ("discrepancy.student_t", "scale = { half_normal = 1 }"),
+    ("discrepancy.synthetic_likelihood", "variance = { half_normal = 1 }"),
     ("effect.crosstalk", "from = \"B\""),
     ("effect.damping", "rate = { half_normal = 0.2 }"),
     ("effect.delay", "time = { normal = [0, 0.3] }"),

@@ -30,6 +30,11 @@ pub trait Discrepancy: Component {
         Ok(None)
     }
 
+    /// Role of this discrepancy for a model whose response is random.
+    fn stochastic_model(&self) -> StochasticModel {
+        StochasticModel::Refused
+    }
+
     /// Returns true if the likelihood uses the noise that the data themselves state ([`Measurements::states_noise`]);
     /// otherwise such data are rejected.
     fn takes_stated_noise(&self) -> bool {
@@ -41,6 +46,17 @@ pub trait Discrepancy: Component {
     fn stated_noise(&self, _layout: &Layout, _response: &[f64]) -> Option<StatedNoise> {
         None
     }
+}
+
+/// Role of a discrepancy for a model that is called directly and whose response is random.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StochasticModel {
+    /// The likelihood is that of a response which the parameters determine.
+    Refused,
+    /// The likelihood may be a random number: it is a distance to data that are simulated.
+    Taken,
+    /// The likelihood is estimated from several runs of such a model, and has no use otherwise.
+    Needed,
 }
 
 /// Noise of one replicate as stated by a study.
@@ -193,6 +209,21 @@ pub trait Likelihood: Send + Sync {
     /// Log-likelihood of the data given the model's response (one value per output) and the hyperparameters; minus
     /// infinity outside their support.
     fn log_likelihood(&self, response: &[f64], hyper: &[f64]) -> f64;
+
+    /// Number of runs of the model with one set of parameters from which [`Likelihood::log_estimate`] estimates the
+    /// likelihood.
+    fn runs(&self) -> usize {
+        1
+    }
+
+    /// Logarithm of the estimated likelihood, given the responses of [`Likelihood::runs`] runs of a stochastic model
+    /// (`runs x outputs`, a row of NaN for a run without a response) and the hyperparameters. The estimate itself, not its
+    /// logarithm, should be unbiased and not negative: a Markov chain that keeps the estimate of its current point then
+    /// samples the posterior exactly (Andrieu and Roberts, Annals of Statistics 37 (2009) 697). By default the
+    /// likelihood of the first run.
+    fn log_estimate(&self, runs: &Matrix, hyper: &[f64]) -> f64 {
+        self.log_likelihood(runs.row(0), hyper)
+    }
 
     /// Log-likelihood for each row of `responses` (`points x outputs`) and `hyper` (`points x hyperparameters`): the
     /// same numbers as [`Likelihood::log_likelihood`].

@@ -35,6 +35,20 @@ pub trait Forward: Send + Sync {
         (mean, jacobian.select_columns(parameters))
     }
 
+    /// Returns true if the response of the same point is another one with other random numbers.
+    fn is_stochastic(&self) -> bool {
+        false
+    }
+
+    /// Responses of several runs at each point, the runs of a point together: `(points x count) x outputs`; a row of NaN
+    /// where a run has no answer. Runs of a point differ in their random numbers only; those of a map that is not
+    /// [stochastic](Self::is_stochastic) are equal.
+    fn runs(&self, points: &Matrix, count: usize, _numbers: Numbers) -> Matrix {
+        let mean = self.mean(points);
+        let rows = mean.iter_rows().flat_map(|row| std::iter::repeat_n(row, count));
+        Matrix::from_rows(self.outputs(), rows)
+    }
+
     /// The map as a linear combination of basis functions, if it has that form.
     fn linear(&self) -> Option<&dyn Linear> {
         None
@@ -44,6 +58,16 @@ pub trait Forward: Send + Sync {
     fn failure(&self) -> Option<String> {
         None
     }
+}
+
+/// Random numbers of the runs of a stochastic map. The first run of a point with its own numbers is [`Forward::mean`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Numbers {
+    /// Other numbers at every point, which the point determines to the last bit: a point that is evaluated again has the
+    /// same response.
+    OfPoint,
+    /// The same numbers at every point: the set with this index.
+    Common(u64),
 }
 
 /// A forward map `y(x) = C' psi(x)` with coefficients `C` (`terms x outputs`).

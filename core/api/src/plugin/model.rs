@@ -20,6 +20,12 @@ pub trait Model: Component {
         Vec::new()
     }
 
+    /// True if the model evaluates the random fields of its conditions ([`Scenario::fields`]) itself. Their coefficients
+    /// are then inputs; otherwise a field is one input for each of its places.
+    fn takes_fields(&self) -> bool {
+        false
+    }
+
     /// Runs the simulator once.
     fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError>;
 

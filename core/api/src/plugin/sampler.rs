@@ -23,6 +23,11 @@ pub trait Sampler: Component {
         true
     }
 
+    /// Returns true if the method needs derivatives of the log density, which an estimated density does not have.
+    fn uses_gradient(&self) -> bool {
+        false
+    }
+
     /// Distribution of the starting points if the study does not choose one.
     fn start_where(&self) -> Start {
         Start::Map

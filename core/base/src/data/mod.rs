@@ -2,6 +2,7 @@
 
 pub mod draws;
 pub mod ensemble;
+pub mod field;
 pub mod layout;
 pub mod layouts;
 pub mod measurements;
@@ -15,6 +16,7 @@ pub mod unit;
 
 pub use draws::Draws;
 pub use ensemble::{Ensemble, FailedRun};
+pub use field::Field;
 pub use layout::{Axis, Coordinates, Layout};
 pub use layouts::Layouts;
 pub use measurements::{Measurements, Observations, Replicate};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Unit;
+use super::{Field, Unit};
 
 /// Known conditions under which a response is simulated or measured, such as a beam power.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -21,6 +21,9 @@ pub struct Scenario {
     /// Named functions of one variable, such as a measured force over time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub functions: Vec<Arc<Function>>,
+    /// Random fields, the same under all conditions of a study.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fields: Vec<Arc<Field>>,
     /// True if nothing was measured under these conditions.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub unmeasured: bool,

@@ -33,7 +33,8 @@ pub(super) struct Compiler {
     tables: Tables,
     /// Functions given by tables.
     functions: BTreeMap<String, Arc<data::Function>>,
-    /// Index in `tables` of the functions that have been used.
+    fields: BTreeMap<String, Arc<data::Field>>,
+    /// Index in `tables` of the functions that have been used; of a field that of its level, followed by its modes.
     curves: BTreeMap<String, usize>,
 }
 
@@ -51,6 +52,7 @@ impl Compiler {
             results: BTreeMap::new(),
             tables: Tables::default(),
             functions: scope.functions.clone(),
+            fields: scope.fields.clone(),
             curves: BTreeMap::new(),
         };
         for (name, x) in [("pi", std::f64::consts::PI), ("e", std::f64::consts::E)] {
@@ -268,7 +270,7 @@ impl Compiler {
         if let Some(function) = functions().find(|function| function.name == name) {
             return Err(fault.help(format!("a function is called as `{}`", function.usage())));
         }
-        if self.functions.contains_key(name) {
+        if self.functions.contains_key(name) || self.fields.contains_key(name) {
             return Err(fault.help(format!("a function is called as `{}`", table_usage(name))));
         }
         // `e` and `pi` are too short to suggest for a misspelt name, and keys of results are not names.

@@ -20,8 +20,8 @@
 //! vectors must have the same length. Elements count from 1: `x[3]`, `x[2:10]` (both ends included), and
 //! `theta[school]` for a vector of whole numbers `school`. `sum`, `mean`, `min`, `max` and others reduce a vector to
 //! one number. The log density of a regression, for example, is `sum(normal_log_density(y, a + b * x, sigma))`. All
-//! functions are listed by [`functions`]; a study's tables, such as a force over time, are called like functions:
-//! `force(time)`.
+//! functions are listed by [`functions`]; a study's tables, such as a force over time, and its random fields are called
+//! like functions: `force(time)`.
 //!
 //! # Undefined results
 //!
@@ -75,6 +75,11 @@ pub fn check(text: &str) -> Result<(), Fault> {
 /// Names that an expression uses; `tables` are the functions given by tables that it may call.
 pub fn names(text: &str, tables: &[&str]) -> Result<Vec<String>, Fault> {
     Ok(tree::Tree::parse(text, tables)?.names().map(str::to_owned).collect())
+}
+
+/// Functions given by tables, of those in `tables`, that an expression calls.
+pub fn called(text: &str, tables: &[&str]) -> Result<Vec<String>, Fault> {
+    Ok(tree::Tree::parse(text, tables)?.called().map(str::to_owned).collect())
 }
 
 #[cfg(test)]

@@ -83,8 +83,7 @@ impl Scope {
     }
 
     fn tree(&self, text: &str) -> Result<Tree, Fault> {
-        let tables: Vec<&str> = self.functions.keys().map(String::as_str).collect();
-        Tree::parse(text, &tables)
+        Tree::parse(text, &self.tables())
     }
 
     /// The text of a part; `None` if the part begins or ends within parentheses that enclose a part of it.

@@ -39,6 +39,7 @@ pub struct Scope {
     pub(super) unknowns: Vec<String>,
     pub(super) data: BTreeMap<String, Data>,
     pub(super) functions: BTreeMap<String, Arc<data::Function>>,
+    pub(super) fields: BTreeMap<String, Arc<data::Field>>,
     pub(super) definitions: BTreeMap<String, Tree>,
 }
 
@@ -61,9 +62,13 @@ impl Scope {
 
     /// Declares the next coordinate of a point: a name such as `sigma`, or an element such as `theta[1]` of a vector.
     ///
-    /// The elements of a vector count from 1 and may be declared in any order.
+    /// The elements of a vector count from 1 and may be declared in any order. Coefficients of a field are declared
+    /// after it ([`Scope::field`]).
     pub fn unknown(&mut self, name: &str) -> Result<(), Fault> {
-        self.declare(element(name).map_or(name, |(base, _)| base), name)?;
+        let base = element(name).map_or(name, |(base, _)| base);
+        if !self.fields.values().any(|field| field.vector() == base) {
+            self.declare(base, name)?;
+        }
         self.unknowns.push(name.to_owned());
         Ok(())
     }
@@ -114,23 +119,41 @@ impl Scope {
     /// # Ok::<(), lacuna::expression::Fault>(())
     /// ```
     pub fn function(&mut self, function: Arc<data::Function>) -> Result<(), Fault> {
-        let name = &function.name;
+        self.tabulated(&function.name, &function.at, function.values.len())?;
+        self.functions.insert(function.name.clone(), function);
+        Ok(())
+    }
+
+    /// Declares a random field. Expressions defined afterwards call it as `name(x)`; its coefficients
+    /// ([`data::Field::coefficients`]) are unknowns, which are declared afterwards too.
+    pub fn field(&mut self, field: Arc<data::Field>) -> Result<(), Fault> {
+        self.tabulated(&field.name, &field.at, field.level.len())?;
+        self.fields.insert(field.name.clone(), field);
+        Ok(())
+    }
+
+    /// Rejects a table that cannot be called by this name.
+    fn tabulated(&self, name: &str, at: &[f64], values: usize) -> Result<(), Fault> {
         self.declare(name, name)?;
         let fault =
             |message: String| Err(Fault::new(0..0, format!("the function `{name}` {message}")));
         if functions().any(|built_in| built_in.name == name) {
             return fault("has the name of one that expressions know".to_owned());
         }
-        let (places, values) = (function.at.len(), function.values.len());
+        let places = at.len();
         if places == 0 || places != values {
             return fault(format!("has {places} places and {values} values"));
         }
         let ascends = |pair: &[f64]| pair[0].partial_cmp(&pair[1]) == Some(Ordering::Less);
-        if let Some(&[before, after]) = function.at.windows(2).find(|pair| !ascends(pair)) {
+        if let Some(&[before, after]) = at.windows(2).find(|pair| !ascends(pair)) {
             return fault(format!("has places that do not ascend: {after} after {before}"));
         }
-        self.functions.insert(name.clone(), function);
         Ok(())
+    }
+
+    /// Names that expressions call besides the built-in functions.
+    pub(super) fn tables(&self) -> Vec<&str> {
+        self.functions.keys().chain(self.fields.keys()).map(String::as_str).collect()
     }
 
     /// Defines an expression that no other expression can use: its key is a text that is not a valid name.
@@ -150,8 +173,7 @@ impl Scope {
     }
 
     fn read(&mut self, name: &str, text: &str) -> Result<(), Fault> {
-        let tables: Vec<&str> = self.functions.keys().map(String::as_str).collect();
-        let tree = Tree::parse(text, &tables).map_err(|fault| fault.within(name))?;
+        let tree = Tree::parse(text, &self.tables()).map_err(|fault| fault.within(name))?;
         self.definitions.insert(name.to_owned(), tree);
         Ok(())
     }
@@ -170,6 +192,7 @@ impl Scope {
         let taken = taken_by_unknown
             || self.data.contains_key(base)
             || self.functions.contains_key(base)
+            || self.fields.contains_key(base)
             || self.definitions.contains_key(base);
         if taken {
             return Err(Fault::new(0..0, format!("there are two of the name `{name}`"))

@@ -57,4 +57,12 @@ impl Tree {
             _ => None,
         })
     }
+
+    /// Names of the tables that are called, in the order of the text, with repetitions.
+    pub fn called(&self) -> impl Iterator<Item = &str> {
+        self.nodes.iter().filter_map(|node| match &node.kind {
+            NodeKind::Table(name, _) => Some(name.as_str()),
+            _ => None,
+        })
+    }
 }

@@ -100,9 +100,12 @@ impl Scope {
         for node in &tree.nodes {
             let measure = match &node.kind {
                 NodeKind::Table(name, id) => {
-                    let function = &self.functions[name];
-                    parts[*id].demand(&function.at_unit)?;
-                    Measure::Of(function.unit.clone())
+                    let (at, unit) = match self.fields.get(name) {
+                        Some(field) => (&field.at_unit, &field.unit),
+                        None => (&self.functions[name].at_unit, &self.functions[name].unit),
+                    };
+                    parts[*id].demand(at)?;
+                    Measure::Of(unit.clone())
                 }
                 kind => measure(kind, &node.span, &parts, tree, units)?,
             };

@@ -9,6 +9,7 @@ pub mod conditions;
 pub mod correlation;
 pub mod emulator;
 pub mod envelope;
+pub mod estimate;
 mod finding;
 pub mod fit;
 pub mod influence;

@@ -1,8 +1,8 @@
 //! Descriptions of all checks, for the documentation.
 
 use super::{
-    bounds, chains, conditions, correlation, emulator, envelope, fit, influence, intervals, modes,
-    population, prior, replicates, residuals, runs, suspicious,
+    bounds, chains, conditions, correlation, emulator, envelope, estimate, fit, influence,
+    intervals, modes, population, prior, replicates, residuals, runs, suspicious,
 };
 
 /// A type of finding.
@@ -28,6 +28,7 @@ pub fn rules() -> Vec<Rule> {
         replicates::rules(),
         envelope::rules(),
         chains::rules(),
+        estimate::rules(),
         modes::rules(),
         bounds::rules(),
         prior::rules(),

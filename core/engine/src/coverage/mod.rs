@@ -127,6 +127,11 @@ fn refuse(study: &Study) -> Result<(), Stop> {
     if study.target.is_some() {
         return Err(Stop::new("a study with `[target]` has no data to generate from a truth"));
     }
+    if study.is_stochastic() {
+        let text =
+            "the data of a stochastic model cannot be generated from one response to a truth";
+        return Err(Stop::new(text).help("calibrate data that the model itself generated"));
+    }
     let missing = [
         ("measurements", study.measurements.is_none()),
         ("discrepancy", study.discrepancy.is_none()),

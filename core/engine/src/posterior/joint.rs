@@ -85,6 +85,21 @@ impl Likelihood for Joint {
         self.blocks.iter().map(one).sum()
     }
 
+    /// The largest number of runs of any block; a block uses as many of them as it needs.
+    fn runs(&self) -> usize {
+        self.blocks.iter().map(|block| block.likelihood.runs()).max().unwrap_or(1)
+    }
+
+    fn log_estimate(&self, runs: &Matrix, hyper: &[f64]) -> f64 {
+        let one = |block: &Block| {
+            let outputs: Vec<usize> = block.outputs.clone().collect();
+            let own: Vec<usize> = (0..block.likelihood.runs()).collect();
+            let part = runs.select_rows(&own).select_columns(&outputs);
+            block.likelihood.log_estimate(&part, &block.own(hyper))
+        };
+        self.blocks.iter().map(one).sum()
+    }
+
     fn log_likelihoods(&self, responses: &Matrix, hyper: &Matrix) -> Vec<f64> {
         // Starts from -0.0, like the sum at a single point, so that the bits agree.
         let mut sums = vec![-0.0; responses.rows()];

@@ -10,21 +10,26 @@ use std::sync::Arc;
 use lacuna::data::{JointPrior, Parameter};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, uniform};
+use lacuna::plugin::forward::Numbers;
 use lacuna::plugin::{Fact, Hyperparameter, Target};
 use lacuna_linalg::Matrix;
 use rand::Rng;
 use rayon::prelude::*;
 
 pub mod bridge;
+mod conditional;
 mod given;
 mod information;
 mod joint;
 mod members;
+mod mode;
 mod of_data;
 
+pub use conditional::CutValues;
 pub use given::Given;
 pub use information::Together;
 pub use joint::Joint;
+pub use mode::Mode;
 pub use of_data::OfData;
 
 use members::{Jacobian, Members};
@@ -40,6 +45,16 @@ pub trait LogLikelihood: Send + Sync {
 
     /// Log-likelihood for each row of `theta` (`points x parameters`) and `hyper` (`points x hyperparameters`).
     fn values(&self, theta: &Matrix, hyper: &Matrix) -> Vec<f64>;
+
+    /// Number of runs of a stochastic model from which each value is estimated; `None` if the values are not estimates.
+    fn runs(&self) -> Option<usize> {
+        None
+    }
+
+    /// Like [`LogLikelihood::values`], estimated with these random numbers.
+    fn estimates(&self, theta: &Matrix, hyper: &Matrix, _numbers: Numbers) -> Vec<f64> {
+        self.values(theta, hyper)
+    }
 
     /// Log-likelihood at one point and its derivatives, by the parameters and then by the hyperparameters.
     fn value_and_gradient(&self, theta: &[f64], hyper: &[f64]) -> (f64, Vec<f64>);
@@ -59,6 +74,7 @@ pub struct Posterior<'a> {
     likelihood: Arc<dyn LogLikelihood + 'a>,
     region: Option<Vec<(f64, f64)>>,
     members: Members<'a>,
+    numbers: Numbers,
 }
 
 impl<'a> Posterior<'a> {
@@ -66,7 +82,25 @@ impl<'a> Posterior<'a> {
     pub fn new(prior: impl Into<JointPrior<'a>>, likelihood: impl LogLikelihood + 'a) -> Self {
         let prior = prior.into();
         let members = Members::of(prior.dependence());
-        Self { prior, likelihood: Arc::new(likelihood), region: None, members }
+        let numbers = Numbers::OfPoint;
+        Self { prior, likelihood: Arc::new(likelihood), region: None, members, numbers }
+    }
+
+    /// The same density, estimated with these random numbers.
+    #[must_use]
+    pub fn with_numbers(&self, numbers: Numbers) -> Self {
+        Self { numbers, ..self.with_members(self.members.clone()) }
+    }
+
+    /// Number of runs of a stochastic model from which the likelihood at a point is estimated; `None` if it is not estimated.
+    /// The estimate at a point is always the same one.
+    pub fn runs(&self) -> Option<usize> {
+        self.likelihood.runs()
+    }
+
+    fn with_members(&self, members: Members<'a>) -> Self {
+        let (prior, likelihood) = (self.prior, self.likelihood.clone());
+        Self { prior, likelihood, region: self.region.clone(), members, numbers: self.numbers }
     }
 
     /// The same density in coordinates whose members are centred to these degrees, from 0 to 1 and in the order of
@@ -76,8 +110,7 @@ impl<'a> Posterior<'a> {
     pub fn with_centred(&self, centred: &[f64], information: &[f64]) -> Self {
         let mut members = self.members.clone();
         members.set(centred, information);
-        let (prior, likelihood) = (self.prior, self.likelihood.clone());
-        Self { prior, likelihood, region: self.region.clone(), members }
+        self.with_members(members)
     }
 
     /// The same density in coordinates whose members are standardised, whatever the study says.
@@ -85,8 +118,7 @@ impl<'a> Posterior<'a> {
     pub fn standardised(&self) -> Self {
         let mut members = self.members.clone();
         members.standardise();
-        let (prior, likelihood) = (self.prior, self.likelihood.clone());
-        Self { prior, likelihood, region: self.region.clone(), members }
+        self.with_members(members)
     }
 
     /// Degree to which the coordinate of each member of a population is centred: population after population.
@@ -209,7 +241,8 @@ impl<'a> Posterior<'a> {
                 self.hyperparameters().len(),
                 inside.iter().map(|&i| &natural[i][d..]),
             );
-            for (&i, value) in inside.iter().zip(self.likelihood.values(&theta, &hyper)) {
+            let values = self.likelihood.estimates(&theta, &hyper, self.numbers);
+            for (&i, value) in inside.iter().zip(values) {
                 density[i] += value;
             }
         }
@@ -338,33 +371,5 @@ impl Target for Posterior<'_> {
     }
     fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
         self.draws(count, stream)
-    }
-}
-
-/// A posterior without the Jacobian of its logarithmic coordinates; see [`Posterior::mode`].
-pub struct Mode<'a>(&'a Posterior<'a>);
-
-impl Target for Mode<'_> {
-    fn dimension(&self) -> usize {
-        self.0.dimension()
-    }
-    fn log_density(&self, points: &Matrix) -> Vec<f64> {
-        self.0.batch(points, false)
-    }
-    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
-        let of = |p: &[f64]| {
-            let natural = self.0.natural(p);
-            self.0.log_prior(&natural) + self.0.log_jacobian(p, &natural, false)
-        };
-        points.iter_rows().map(of).collect()
-    }
-    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
-        self.0.value_and_gradient(point, false)
-    }
-    fn bounds(&self) -> Vec<(f64, f64)> {
-        self.0.coordinate_bounds()
-    }
-    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
-        self.0.draws(count, stream)
     }
 }

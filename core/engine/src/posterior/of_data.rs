@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use lacuna::plugin::discrepancy::Compressed;
 use lacuna::plugin::effect::{Placed, with_tangents};
-use lacuna::plugin::forward::Linear;
+use lacuna::plugin::forward::{Linear, Numbers};
 use lacuna::plugin::{Fact, Forward, Hyperparameter, Likelihood};
 use lacuna_linalg::{Matrix, multiply_vector};
+use rayon::prelude::*;
 
 use super::LogLikelihood;
 
@@ -82,6 +83,24 @@ impl<'a> OfData<'a> {
         values
     }
 
+    /// Logarithm of the estimated likelihood at one point from its runs, the given rows of `runs`.
+    fn estimate(&self, runs: &Matrix, rows: Range<usize>, theta: &[f64], hyper: &[f64]) -> f64 {
+        let is_finite = |row: &[f64]| row.iter().all(|y| y.is_finite());
+        let response = |i: usize| {
+            let row = runs.row(i);
+            if is_finite(row) {
+                self.with_effects(row.to_vec(), theta, hyper)
+            } else {
+                row.to_vec()
+            }
+        };
+        let responses = Matrix::from_rows(runs.columns(), rows.map(response));
+        if !responses.iter_rows().any(is_finite) {
+            return f64::NEG_INFINITY;
+        }
+        self.likelihood.log_estimate(&responses, &hyper[self.own()..])
+    }
+
     fn with_effects(&self, mut response: Vec<f64>, theta: &[f64], hyper: &[f64]) -> Vec<f64> {
         for (effect, range) in &self.effects {
             response = effect.apply(&response, &hyper[range.clone()], theta);
@@ -105,6 +124,24 @@ impl<'a> LogLikelihood for OfData<'a> {
         let batch = |rows: &[usize]| {
             let theta = theta.select_rows(rows);
             self.batch(self.forward.mean(&theta), &theta, &hyper.select_rows(rows))
+        };
+        batches.flat_map(batch).collect()
+    }
+
+    fn runs(&self) -> Option<usize> {
+        self.forward.is_stochastic().then(|| self.likelihood.runs().max(1))
+    }
+
+    fn estimates(&self, theta: &Matrix, hyper: &Matrix, numbers: Numbers) -> Vec<f64> {
+        let Some(count) = self.runs() else { return self.values(theta, hyper) };
+        let rows: Vec<usize> = (0..theta.rows()).collect();
+        let batches = rows.chunks((BATCH / (count * self.forward.outputs()).max(1)).max(1));
+        let batch = |points: &[usize]| {
+            let runs = self.forward.runs(&theta.select_rows(points), count, numbers);
+            let one = |(k, &i): (usize, &usize)| {
+                self.estimate(&runs, count * k..count * (k + 1), theta.row(i), hyper.row(i))
+            };
+            points.par_iter().enumerate().map(one).collect::<Vec<f64>>()
         };
         batches.flat_map(batch).collect()
     }

@@ -13,6 +13,7 @@ use crate::screening::Screening;
 
 pub use crate::gap::result::GapFindings;
 use crate::stage::calibrate::PopulationOutcome;
+pub use crate::stage::fields::{FieldBand, FieldFindings};
 pub use crate::stage::quantities::{
     Bounds, BoundsFindings, End, InputShare, PROBABILITIES, Propagated, QuantityFindings, Range,
 };
@@ -39,6 +40,8 @@ pub struct Findings {
     pub intervals: Vec<usize>,
     /// Facts about the dependence of the priors; empty if they are independent.
     pub prior: Vec<Fact>,
+    /// Random fields.
+    pub fields: Vec<FieldFindings>,
     /// Shapes of the responses, scenario by scenario.
     pub layouts: Layouts,
     /// Simulation runs.

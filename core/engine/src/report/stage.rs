@@ -13,18 +13,19 @@ use lacuna_run::{Kept, RunDirectory, Stage};
 use crate::assess::Assessment;
 use crate::gap::result::{GapFindings, GapResult, added};
 use crate::report::findings::{
-    CalibrationFindings, CoordinateFindings, CurvesLeftOutFindings, EnsembleFindings, Findings,
-    FittedDistribution, LeftOutFindings, MeasuredFindings, Role, RunInput, SurrogateFindings,
+    CalibrationFindings, CoordinateFindings, CurvesLeftOutFindings, EnsembleFindings,
+    FieldFindings, Findings, FittedDistribution, LeftOutFindings, MeasuredFindings, Role, RunInput,
+    SurrogateFindings,
 };
 use crate::report::{render, summary};
 use crate::screening::{Screening, screen};
 use crate::stage::artifacts::Artifacts;
 use crate::stage::calibrate::Calibrated;
-use crate::stage::derived;
 use crate::stage::evidence::Weighed;
 use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::read::Measured;
 use crate::stage::validate::Validated;
+use crate::stage::{derived, fields};
 use crate::study::Study;
 
 /// Results to be reported.
@@ -83,6 +84,7 @@ fn findings(
         components: components(study),
         parameters: study.parameters.clone(),
         intervals: study.intervals(),
+        fields: fields(study, calibrated),
         prior: study.prior_facts(),
         layouts: study.layouts.clone(),
         ensemble: all
@@ -109,6 +111,12 @@ fn findings(
         made_by,
         note: study.about.note.clone(),
     }
+}
+
+/// The random fields, under the posterior if there is a calibration.
+fn fields(study: &Study, calibrated: Option<&Calibrated>) -> Vec<FieldFindings> {
+    let kept = calibrated.map(|c| c.draws.from_step(c.outcome.burn_in));
+    fields::findings(study, kept.as_ref())
 }
 
 fn components(study: &Study) -> Vec<(String, String)> {
@@ -151,7 +159,7 @@ fn inputs(study: &Study) -> Vec<RunInput> {
     let by_group = study.hierarchy.trained.is_some();
     let of = |(i, parameter): (usize, &Parameter)| {
         let name = &trained.unknowns[i].name;
-        let places = || study.unknowns.iter().enumerate().filter(|(_, u)| !u.of_population);
+        let places = || study.unknowns.iter().enumerate().filter(|(_, u)| !u.of_population());
         RunInput {
             name: parameter.name.clone(),
             symbol: parameter.symbol.clone(),

@@ -4,9 +4,9 @@ use lacuna::run::Stop;
 
 use super::findings::Findings;
 use super::section::{
-    accuracy_table, banner, bounds_table, evidence, group_word, headline, population_table,
-    posterior_table, quantity_table, reliability_table, screening, share_table, view,
-    without_table,
+    accuracy_table, banner, bounds_table, evidence, field_table, group_word, headline,
+    population_table, posterior_table, quantity_table, reliability_table, screening, share_table,
+    view, without_table,
 };
 use crate::gap::next::Wanted;
 use crate::gap::report;
@@ -34,6 +34,9 @@ pub fn summary_text(findings: &Findings) -> String {
         if !evidence.is_empty() {
             parts.push(evidence.join("\n") + "\n");
         }
+    }
+    if !findings.fields.is_empty() {
+        parts.push(format!("random fields\n{}", field_table(&findings.fields).text()));
     }
     if let Some(validation) =
         findings.validation.as_ref().filter(|v| v.cases.iter().any(|c| !c.accuracy.is_empty()))

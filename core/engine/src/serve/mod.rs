@@ -189,7 +189,10 @@ fn of_run<R>(
     if let Some(emulator) = &emulator {
         all.push(emulator);
     }
-    let (Some(measured), Some(_)) = (&problem.data.value.measured, &study.discrepancy) else {
+    // The draws of a cut distribution have no common density, and an estimated one has no derivatives.
+    let dense = study.cut().is_empty() && !study.is_stochastic();
+    let measured = problem.data.value.measured.as_ref().filter(|_| dense);
+    let (Some(measured), Some(_)) = (measured, &study.discrepancy) else {
         return Ok(act(&all));
     };
     // With populations the log density of the members themselves has no maximum, and no coordinates are those of others.

@@ -1,33 +1,36 @@
 //! Stage 5: sampling of the posterior of the parameters.
 
+mod cut;
+mod estimated;
 mod kept;
 mod law;
 mod near;
 mod population;
 mod predicting;
-
-use std::path::Path;
+mod sample;
 
 use lacuna::data::{Draws, Observations, Statistics, Unit};
 use lacuna::diagnose::Diagnosis;
 use lacuna::math::distribution::Distribution;
-use lacuna::math::random::Stream;
-use lacuna::plugin::sampler::{Evidence, Start};
-use lacuna::plugin::{Fact, Forward, Likelihood, Sampler, Target};
+use lacuna::plugin::sampler::Evidence;
+use lacuna::plugin::{Fact, Forward, Likelihood, Target};
 use lacuna::run::{Observer, Progress, Stop};
 use lacuna_linalg::Matrix;
 use lacuna_run::{Folder, Kept, RunDirectory, Stage};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use super::best_fit;
 use super::read::Measured;
-use super::sampling::{Length, Sampled};
-use super::start::{inside, maxima, sobol};
-use super::{best_fit, sampling};
 use crate::posterior::{Joint, OfData, Posterior};
 use crate::stage::inverse_problem::{InverseProblem, Trial};
 use crate::study::Study;
 
+use cut::sample_cut;
+use sample::{Asked, sample};
+
+pub use cut::CutOutcome;
+pub use estimated::LikelihoodEstimate;
 pub use law::Law;
 pub use population::{MemberOutcome, NewMember, PopulationOutcome};
 
@@ -67,6 +70,12 @@ pub struct Outcome {
     pub facts: Vec<Fact>,
     /// Evidence, if it is known.
     pub evidence: Option<Evidence>,
+    /// Estimate of the likelihood from runs of a stochastic model; `None` if the likelihood is not estimated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimate: Option<LikelihoodEstimate>,
+    /// Parameters that the data do not update; `None` if there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut: Option<CutOutcome>,
     /// Populations, in the order of the study's parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub populations: Vec<PopulationOutcome>,
@@ -231,9 +240,21 @@ pub fn draw(
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
     let plan = section.built.plugin.plan(posterior.dimension());
     observer.begin(Stage::Calibrate.label(), "step", plan.steps as u64);
-    let kept = run.keep(folder, inputs, observer, |folder| {
-        calibrate(study, posterior, trial, folder, observer)
-    })?;
+    let progress = Progress::new(observer);
+    let asked = Asked {
+        study,
+        posterior,
+        stated: study.start(),
+        random: Trial::stream(trial, study, "calibrate"),
+        quick: trial.is_some_and(|trial| trial.quick),
+    };
+    let cut = study.cut();
+    let kept = if cut.is_empty() {
+        run.keep(folder, inputs, observer, |folder| sample(&asked, folder, &progress))?
+    } else {
+        let inputs = json!([inputs, cut]);
+        run.keep(folder, &inputs, observer, |folder| sample_cut(&asked, &cut, folder, &progress))?
+    };
     observer.end(Stage::Calibrate.label(), &summary(&kept.value));
     Ok(kept)
 }
@@ -242,156 +263,4 @@ fn summary(calibrated: &Calibrated) -> String {
     let (draws, outcome) = (&calibrated.draws, &calibrated.outcome);
     let state = if outcome.diagnosis.converged { "converged" } else { "not converged" };
     format!("{} chains x {} steps, {state}", draws.chains, draws.steps)
-}
-
-fn calibrate(
-    study: &Study,
-    posterior: &Posterior<'_>,
-    trial: Option<Trial>,
-    folder: &Path,
-    observer: &dyn Observer,
-) -> Result<Calibrated, Stop> {
-    let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
-    let random = Trial::stream(trial, study, "calibrate");
-    let maxima = maxima(posterior, &study.start(), &random.named("optimise"));
-    sampling::broken(posterior)?;
-    let mut maxima = maxima?;
-    let adapted = population::adapted(study, posterior, &mut maxima)?;
-    let posterior = adapted.as_ref().unwrap_or(posterior);
-    let best = &maxima[0];
-    let plan = section.built.plugin.plan(posterior.dimension());
-    let sampler = &*section.built.plugin;
-    let start = || starts(posterior, sampler, section.common.start, &best.point, &random);
-    let coordinates = coordinates(study, posterior);
-    let progress = Progress::new(observer);
-    let length = Length {
-        burn_in: section.common.burn_in.get(),
-        stop: section.common.stop.as_ref(),
-        half: trial.is_some_and(|trial| trial.quick),
-    };
-    let mut sampled = sampling::sample(
-        &*section.built.plugin,
-        posterior,
-        length,
-        start,
-        &random.named("sample"),
-        folder,
-        &progress,
-    )?;
-    sampled.draws.names = coordinates.iter().map(|c| c.name.clone()).collect();
-    let other_maxima = maxima[1..]
-        .iter()
-        .filter(|m| best.value - m.value < 10.0)
-        .map(|m| (posterior.natural(&m.point), m.value))
-        .collect();
-    let best_draw = best_draw(posterior, &sampled);
-    let draws = natural(posterior, sampled.draws);
-    let kept = draws.from_step(sampled.burn_in);
-    let diagnosis = if let Some(harvest) = &sampled.harvest {
-        Diagnosis::of_harvest(&kept, harvest.effective_size, &harvest.doubts)
-    } else {
-        let sampler = &section.built.plugin;
-        let (doubts, notes) = (sampler.doubts(&sampled.state), sampler.notes(&sampled.state));
-        Diagnosis::of(&kept, plan.ensemble).with_notes(notes).with_doubts(doubts)
-    };
-    let (harvested, evidence) =
-        sampled.harvest.map_or_else(Default::default, |h| (h.facts, h.evidence));
-    let mut evidence = evidence.or_else(|| section.built.plugin.evidence(&sampled.state));
-    if let Some(evidence) = &mut evidence {
-        let (log, error) = posterior.log_share();
-        evidence.log += log;
-        evidence.error = evidence.error.hypot(error).hypot(posterior.prior().log_error());
-    }
-    let outcome = Outcome {
-        coordinates,
-        map: posterior.natural(&best.point),
-        map_log_density: best.value,
-        other_maxima,
-        best_draw,
-        burn_in: sampled.burn_in,
-        acceptance: sampled.acceptance,
-        diagnosis,
-        evaluations: sampled.state.evaluations,
-        facts: [posterior.facts(), section.built.plugin.facts(), harvested].concat(),
-        evidence,
-        populations: population::outcomes(study, posterior, &kept),
-    };
-    Ok(Calibrated { draws, statistics: sampled.statistics, outcome })
-}
-
-/// Starting points, one per chain.
-fn starts(
-    posterior: &Posterior<'_>,
-    sampler: &dyn Sampler,
-    wanted: Option<Start>,
-    best: &[f64],
-    random: &Stream,
-) -> Result<Matrix, Stop> {
-    let chains = sampler.plan(posterior.dimension()).chains;
-    let random = random.named("start");
-    // A method that draws its own starting points needs only the right number of points, whatever their density.
-    if !sampler.uses_starts() {
-        return Ok(posterior.prior_draws(chains, &random));
-    }
-    match wanted.unwrap_or_else(|| sampler.start_where()) {
-        Start::Prior => inside(posterior, chains, |piece| {
-            let more = random.named("more").at(piece as u64);
-            Ok(posterior.prior_draws(4 * chains, if piece == 0 { &random } else { &more }))
-        }),
-        Start::Sobol => {
-            inside(posterior, chains, |piece| sobol(posterior, 4 * chains * piece, 4 * chains))
-        }
-        Start::Map if !posterior.centred().is_empty() => {
-            near::around(posterior, best, |near, best| around(near, best, chains, &random))
-        }
-        Start::Map => around(posterior, best, chains, &random),
-    }
-}
-
-/// Starting points around a maximum.
-fn around(
-    target: &dyn Target,
-    best: &[f64],
-    chains: usize,
-    random: &Stream,
-) -> Result<Matrix, Stop> {
-    match lacuna_optimise::laplace(target, best) {
-        Ok(laplace) => lacuna_optimise::scatter(target, best, &laplace, chains, random),
-        Err(_) => lacuna_optimise::scatter_without_bounds(target, best, chains, random),
-    }
-}
-
-fn coordinates(study: &Study, posterior: &Posterior<'_>) -> Vec<Coordinate> {
-    let parameters = study.parameters.iter().map(|p| Coordinate {
-        name: p.name.clone(),
-        symbol: p.symbol.clone(),
-        unit: p.unit.clone(),
-        prior: Some(p.prior.clone()),
-        reference: p.reference,
-    });
-    let hyper = posterior.hyperparameters().iter().map(|h| Coordinate {
-        name: h.name.clone(),
-        symbol: h.symbol.clone(),
-        unit: h.unit.clone(),
-        prior: Some(h.prior.clone()),
-        reference: None,
-    });
-    parameters.chain(hyper).collect()
-}
-
-fn best_draw(posterior: &Posterior<'_>, sampled: &Sampled) -> (Vec<f64>, f64) {
-    let draws = &sampled.draws;
-    let Some((chain, step)) = draws.best() else { return (Vec::new(), f64::NEG_INFINITY) };
-    let point = draws.point(chain, step);
-    let row = Matrix::from_vec(1, point.len(), point.to_vec());
-    (posterior.natural(point), posterior.mode().log_density(&row)[0])
-}
-
-fn natural(posterior: &Posterior<'_>, mut draws: Draws) -> Draws {
-    let d = draws.dimension();
-    for point in draws.values.chunks_exact_mut(d) {
-        let values = posterior.natural(point);
-        point.copy_from_slice(&values);
-    }
-    draws
 }

@@ -1,19 +1,23 @@
 //! Route without a surrogate: the model itself is the forward map.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Numbers;
 use lacuna::plugin::model::{Call, EvalError, Gradient, Response};
 use lacuna::run::{Observer, Stop, files};
 use lacuna_linalg::Matrix;
-use lacuna_run::{Kept, RunDirectory};
+use lacuna_run::{Kept, RunDirectory, Stage};
 use rayon::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::best_fit::BestFit;
+use super::calls::Calls;
 use super::inverse_problem::Route;
 use super::read;
 use super::read::Data;
@@ -41,10 +45,15 @@ impl<'a> Direct<'a> {
         observer: &dyn Observer,
     ) -> Result<Self, Stop> {
         let data = read::stage(study, None, run, observer)?;
-        let forward = ModelMap::of(study)?;
+        let mut forward = ModelMap::of(study)?;
         let model = study.model.as_ref().map(|m| (m.built.identity(), &m.common));
         let sources = files::hash_sources(&forward.simulator.model.files(&study.directory))?;
-        let origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
+        let made_from = json!([model, study.scenarios, study.layouts, sources]);
+        forward.calls = Some(Calls::open(calls_file(run, &made_from)?));
+        let mut origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
+        if forward.is_stochastic() {
+            origin = json!([origin, study.about.seed]);
+        }
         let origin = files::hash(origin.to_string().as_bytes());
         Ok(Self { data, best_fit: None, forward, origin })
     }
@@ -78,6 +87,13 @@ impl<'a> Direct<'a> {
     }
 }
 
+/// File of the slow evaluations of a model with these inputs.
+fn calls_file(run: &RunDirectory, made_from: &Value) -> Result<PathBuf, Stop> {
+    let folder = Stage::Simulate.part("calls");
+    let hash = run.hash_of(&folder, made_from)?;
+    Ok(run.stage_folder(&folder).join(format!("{}.jsonl", &hash[..12])))
+}
+
 /// The model of a study as its forward map.
 ///
 /// A failed evaluation gives a row of NaN, and is counted with its reason. Derivatives are the model's own if it has
@@ -88,6 +104,8 @@ pub struct ModelMap<'a> {
     outputs: usize,
     evaluations: AtomicU64,
     failures: Mutex<Failures>,
+    /// Slow evaluations that are kept.
+    calls: Option<Calls>,
 }
 
 #[derive(Default)]
@@ -113,7 +131,7 @@ impl<'a> ModelMap<'a> {
     /// A simulator as the forward map of its unknowns, which have these priors.
     pub fn with(simulator: Simulator<'a>, priors: Vec<Distribution>, outputs: usize) -> Self {
         let (evaluations, failures) = (AtomicU64::new(0), Mutex::default());
-        Self { simulator, priors, outputs, evaluations, failures }
+        Self { simulator, priors, outputs, evaluations, failures, calls: None }
     }
 
     /// Number of evaluations and of failures of the model, with the most frequent reasons.
@@ -151,25 +169,58 @@ impl<'a> ModelMap<'a> {
         None
     }
 
-    /// Responses to one scenario at some rows of `points`.
+    /// Responses to one scenario in some runs: the row of `points` and the number of each. Those that are kept are not
+    /// computed again.
     fn some(
         &self,
-        setting: &Setting<'_>,
+        place: usize,
         points: &Matrix,
-        rows: &[usize],
+        rows: &[(usize, u64)],
+        numbers: Numbers,
     ) -> Vec<Option<Vec<f64>>> {
-        if self.failure().is_some() {
-            return vec![None; rows.len()];
+        let setting = &self.simulator.settings[place];
+        let inputs = |&(i, run): &(usize, u64)| setting.inputs_of_run(points.row(i), run, numbers);
+        let inputs: Vec<Vec<f64>> = rows.iter().map(inputs).collect();
+        let known = |inputs: &Vec<f64>| self.calls.as_ref()?.response(place, inputs);
+        let mut answers: Vec<Option<Vec<f64>>> = inputs.iter().map(known).collect();
+        let missing: Vec<usize> = (0..rows.len()).filter(|&k| answers[k].is_none()).collect();
+        let asked: Vec<&Vec<f64>> = missing.iter().map(|&k| &inputs[k]).collect();
+        for (k, answer) in missing.into_iter().zip(self.computed(place, &asked)) {
+            answers[k] = answer;
         }
-        let inputs: Vec<Vec<f64>> = rows.iter().map(|&i| setting.inputs(points.row(i))).collect();
+        answers
+    }
+
+    /// Responses to one scenario for some inputs of the model.
+    fn computed(&self, place: usize, inputs: &[&Vec<f64>]) -> Vec<Option<Vec<f64>>> {
+        if inputs.is_empty() || self.failure().is_some() {
+            return vec![None; inputs.len()];
+        }
+        let setting = &self.simulator.settings[place];
         let calls: Vec<Call<'_>> =
             inputs.iter().map(|inputs| self.simulator.call(setting, inputs)).collect();
+        let begun = Instant::now();
         let mut responses = self.simulator.model.predict_batch(&calls).into_iter();
+        let taken = begun.elapsed() / inputs.len() as u32;
         let missing = || {
             Err(EvalError::Fatal("the model returned fewer responses than requested".to_owned()))
         };
-        let mut next = || responses.next().unwrap_or_else(missing);
-        rows.iter().map(|_| self.note(setting.checked(next())).map(|r| r.values)).collect()
+        let one = |inputs: &&Vec<f64>| {
+            let answer = self.note(setting.checked(responses.next().unwrap_or_else(missing)))?;
+            self.keep(place, inputs, &answer.values, taken);
+            Some(answer.values)
+        };
+        inputs.iter().map(one).collect()
+    }
+
+    /// Keeps a response if it was slow; no more responses are computed if that fails.
+    fn keep(&self, place: usize, inputs: &[f64], response: &[f64], taken: Duration) {
+        let Some(calls) = &self.calls else { return };
+        if let Err(stop) = calls.note(place, inputs, response, taken)
+            && let Ok(mut failures) = self.failures.lock()
+        {
+            failures.fatal.get_or_insert(stop.to_string());
+        }
     }
 
     /// Response to one scenario with its derivatives.
@@ -196,7 +247,8 @@ impl<'a> ModelMap<'a> {
                 around.push(moved);
             }
         }
-        let responses = self.mean(&Matrix::from_rows(point.len(), around));
+        // Differences of a stochastic response are those between runs with the same random numbers.
+        let responses = self.runs(&Matrix::from_rows(point.len(), around), 1, Numbers::Common(0));
         let slope = |i: usize, j: usize| {
             let [here, above, below] = [0, 2 * j + 1, 2 * j + 2].map(|row| responses[(row, i)]);
             match (above.is_finite(), below.is_finite()) {
@@ -224,24 +276,34 @@ impl Forward for ModelMap<'_> {
         self.outputs
     }
 
+    fn is_stochastic(&self) -> bool {
+        self.simulator.is_stochastic()
+    }
+
     fn mean(&self, points: &Matrix) -> Matrix {
+        self.runs(points, 1, Numbers::OfPoint)
+    }
+
+    fn runs(&self, points: &Matrix, count: usize, numbers: Numbers) -> Matrix {
         let size = self.simulator.model.batch().max(1);
-        let rows: Vec<usize> = (0..points.rows()).collect();
-        let tasks: Vec<(&Setting<'_>, &[usize])> = self
-            .simulator
-            .settings
-            .iter()
-            .flat_map(|setting| rows.chunks(size).map(move |some| (setting, some)))
+        let of_point = |i: usize| (0..count as u64).map(move |run| (i, run));
+        let rows: Vec<(usize, u64)> = (0..points.rows()).flat_map(of_point).collect();
+        let all_rows: Vec<usize> = (0..rows.len()).collect();
+        let settings = &self.simulator.settings;
+        let tasks: Vec<(usize, &[usize])> = (0..settings.len())
+            .flat_map(|place| all_rows.chunks(size).map(move |some| (place, some)))
             .collect();
-        let answers: Vec<Vec<Option<Vec<f64>>>> =
-            tasks.par_iter().map(|(setting, some)| self.some(setting, points, some)).collect();
-        let mut all = Matrix::zeros(points.rows(), self.outputs);
-        for ((setting, some), answers) in tasks.iter().zip(answers) {
+        let answer = |&(place, some): &(usize, &[usize])| {
+            self.some(place, points, &rows[some[0]..some[0] + some.len()], numbers)
+        };
+        let answers: Vec<Vec<Option<Vec<f64>>>> = tasks.par_iter().map(answer).collect();
+        let mut all = Matrix::zeros(rows.len(), self.outputs);
+        for (&(place, some), answers) in tasks.iter().zip(answers) {
             for (&row, answer) in some.iter().zip(answers) {
-                let place = &mut all.row_mut(row)[setting.outputs.clone()];
+                let outputs = &mut all.row_mut(row)[settings[place].outputs.clone()];
                 match answer {
-                    Some(values) => place.copy_from_slice(&values),
-                    None => place.fill(f64::NAN),
+                    Some(values) => outputs.copy_from_slice(&values),
+                    None => outputs.fill(f64::NAN),
                 }
             }
         }

@@ -55,8 +55,18 @@ pub fn stage(
         |_| {
             let draws = calibrated.value.draws.from_step(calibrated.value.outcome.burn_in);
             let mut missing = Vec::new();
-            let evidence = match &calibrated.value.outcome.evidence {
+            let outcome = &calibrated.value.outcome;
+            let evidence = match &outcome.evidence {
                 Some(evidence) => Some(evidence.clone()),
+                None if outcome.cut.is_some() => {
+                    missing.push("no evidence: the data do not update all parameters".to_owned());
+                    None
+                }
+                None if outcome.estimate.is_some() => {
+                    let text = "no evidence: bridge sampling needs a density that is not estimated";
+                    missing.push(format!("{text}; use a sampler that gives the evidence itself"));
+                    None
+                }
                 None => bridge::bridge(
                     posterior,
                     &coordinates(posterior, &thinned(&draws)),
@@ -70,7 +80,8 @@ pub fn stage(
                 .ok(),
             };
             let weighed = Weighed { evidence, missing, ..Weighed::default() };
-            match predicting {
+            // Given all other data the distribution of a cut parameter is not that of left-out data.
+            match predicting.filter(|_| outcome.cut.is_none()) {
                 Some(p) => weighed.predicting(study, &p, &calibrated.value),
                 None => Ok(weighed),
             }

@@ -21,7 +21,7 @@ pub(super) fn parameters(study: &Study) -> Result<Vec<usize>, Stop> {
         Some(simulator) => {
             // Location and scale of a population act through its members.
             let mut idle = simulator.idle(study.parameters.len());
-            idle.retain(|&i| !study.unknowns[i].of_population);
+            idle.retain(|&i| !study.unknowns[i].of_population());
             Ok(idle)
         }
         None => Ok(Vec::new()),

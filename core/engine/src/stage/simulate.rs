@@ -145,7 +145,10 @@ impl Inputs {
         let asked: Vec<_> = simulator.settings.iter().map(|s| (&s.asked, s.scenario)).collect();
         let model_files: Vec<PathBuf> = simulator.model.files(simulator.study);
         let files = files::hash_sources(&model_files)?;
-        Ok(Self { model: json!(model), asked: json!(asked), files })
+        let seeds: Vec<_> = simulator.settings.iter().filter_map(Setting::seeds_of).collect();
+        // In a study without a stochastic model the seeds are omitted, which keeps the hash.
+        let model = if seeds.is_empty() { json!(model) } else { json!([model, seeds]) };
+        Ok(Self { model, asked: json!(asked), files })
     }
 
     fn value(&self, asked: Asked<'_>) -> Value {

@@ -1,15 +1,21 @@
 //! The study's model as a function of the study's parameters, in the study's units.
 
+mod asked;
+
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use lacuna::data::{Axis, Coordinates, Layout, Scenario, Unit};
+use lacuna::data::{Layout, Scenario, Unit};
+use lacuna::math::random::Stream;
 use lacuna::plugin::executor::Recipe;
+use lacuna::plugin::forward::Numbers;
 use lacuna::plugin::model::{Call, EvalError, Gradient, Input, Model, Response};
 use lacuna::plugin::registry::Section;
 use lacuna::plugin::{Context, Given};
 use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, multiply};
+
+use asked::{asked, folder};
 
 use crate::study::Study;
 use crate::study::file::ModelKeys;
@@ -63,6 +69,8 @@ pub struct Setting<'a> {
     used: Vec<usize>,
     /// Factor from the model's unit of the response to the study's.
     factor: f64,
+    /// Random numbers of the study for runs under these conditions.
+    random: Stream,
 }
 
 /// Source of an input's value.
@@ -72,13 +80,18 @@ enum Source {
     Parameter(usize, f64),
     /// Index of an expression and the factor from its unit to the input's.
     Computed(usize, f64),
+    /// The seed of the run.
+    Seed,
 }
+
+/// Number of different seeds: those that a signed integer of 32 bits holds, without zero.
+const SEEDS: u64 = (1 << 31) - 1;
 
 impl Source {
     /// Parameters on which the value depends; for an expression, those of all expressions.
     fn parameters(&self, computed: Option<&Computed>) -> Vec<usize> {
         match self {
-            Self::Fixed(_) => Vec::new(),
+            Self::Fixed(_) | Self::Seed => Vec::new(),
             Self::Parameter(i, _) => vec![*i],
             Self::Computed(..) => computed.map_or_else(Vec::new, |all| all.parameters.clone()),
         }
@@ -128,6 +141,7 @@ impl<'a> Simulator<'a> {
             let (asked, factor) = asked(&layout, &signature.layout)?;
             let folder = folder(place, &scenario.name);
             let ranges = signature.inputs.iter().map(|input| input.range).collect();
+            let random = super::stream(study, "model").at(place as u64);
             settings.push(Setting {
                 scenario,
                 asked,
@@ -138,12 +152,18 @@ impl<'a> Simulator<'a> {
                 computed,
                 used,
                 factor,
+                random,
             });
         }
         let free = other.free.iter().map(|(name, _)| (*name).to_owned());
         let unknowns = study.parameters.iter().map(|p| p.name.clone()).chain(free).collect();
         let recipe = Recipe::of(&section.built)?;
         Ok(Self { study: &study.directory, model, recipe, names, units, settings, unknowns })
+    }
+
+    /// Returns true if the model receives a seed.
+    pub fn is_stochastic(&self) -> bool {
+        self.settings.iter().any(|setting| setting.seeds().next().is_some())
     }
 
     /// Responses to all scenarios at one point, in the study's unit.
@@ -232,24 +252,54 @@ impl<'a> Simulator<'a> {
     }
 }
 
-/// Folder of a scenario's runs; in a study without scenarios, that of all runs.
-fn folder(place: usize, name: &str) -> PathBuf {
-    if name.is_empty() {
-        return PathBuf::new();
-    }
-    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
-    format!("{}-{}", place + 1, name.chars().map(plain).collect::<String>()).into()
-}
-
 impl Setting<'_> {
-    /// Inputs of the model at one point of the study's parameters.
+    /// Inputs of the model at one point of the study's parameters; of a stochastic model, those of the point's first run.
     pub fn inputs(&self, point: &[f64]) -> Vec<f64> {
+        self.inputs_of_run(point, 0, Numbers::OfPoint)
+    }
+
+    /// Inputs of the run with this number at one point of the study's parameters.
+    pub fn inputs_of_run(&self, point: &[f64], run: u64, numbers: Numbers) -> Vec<f64> {
+        let mut inputs = self.inputs_without_seed(point);
+        for place in self.seeds() {
+            inputs[place] = self.seed(&inputs, run, numbers);
+        }
+        inputs
+    }
+
+    /// Key of the stream from which the seeds of runs are made; `None` if the model receives none.
+    pub fn seeds_of(&self) -> Option<[u64; 4]> {
+        self.seeds().next().map(|_| self.random.key())
+    }
+
+    /// Indices of the inputs that receive the seed.
+    fn seeds(&self) -> impl Iterator<Item = usize> {
+        let sources = self.sources.iter().enumerate();
+        sources.filter(|(_, source)| matches!(source, Source::Seed)).map(|(place, _)| place)
+    }
+
+    /// Seed of a run with these inputs.
+    fn seed(&self, inputs: &[f64], run: u64, numbers: Numbers) -> f64 {
+        let stream = match numbers {
+            Numbers::OfPoint => {
+                let own = self.random.named("point");
+                inputs.iter().fold(own, |stream, input| stream.at(input.to_bits()))
+            }
+            Numbers::Common(set) => self.random.named("common").at(set),
+        };
+        let word = stream.at(run).key()[0];
+        (1 + word % SEEDS) as f64
+    }
+
+    /// Inputs with zero in place of the seed.
+    fn inputs_without_seed(&self, point: &[f64]) -> Vec<f64> {
         let computed = self.computed.as_ref().map(|computed| {
             let unknowns: Vec<f64> = computed.parameters.iter().map(|&i| point[i]).collect();
             computed.program.value(&unknowns)
         });
         let value = |source: &Source| match source {
             Source::Fixed(value) => *value,
+            Source::Seed => 0.0,
             Source::Parameter(i, factor) => point[*i] * factor,
             Source::Computed(i, factor) => {
                 computed.as_ref().map_or(f64::NAN, |values| values[*i] * factor)
@@ -314,6 +364,11 @@ fn source(
 ) -> Result<Source, Stop> {
     let no_unit =
         || Stop::new(format!("the unit of `{}` does not convert to that of the model", input.name));
+    let keys = [Some(other.section), study.model.as_ref()].into_iter().flatten();
+    let mut seeds = keys.filter_map(|section| section.common.seed.as_ref());
+    if seeds.any(|name| name.as_str() == input.name) {
+        return Ok(Source::Seed);
+    }
     if let Some(k) = other.free.iter().position(|(name, _)| *name == input.name) {
         let factor = other.free[k].1.factor_to(&input.unit).ok_or_else(no_unit)?;
         return Ok(Source::Parameter(study.parameters.len() + k, factor));
@@ -340,21 +395,4 @@ fn source(
     }
     let default = input.default.map(Source::Fixed);
     default.ok_or_else(|| Stop::new(format!("nothing sets the input `{}`", input.name)))
-}
-
-/// The study's layout in the model's units, and the factor from the model's unit of the response to the study's.
-fn asked(ours: &Layout, theirs: &Layout) -> Result<(Layout, f64), Stop> {
-    let mismatch = |what: &str| Stop::new(format!("{what} does not convert to the model's unit"));
-    let factor =
-        theirs.unit.factor_to(&ours.unit).ok_or_else(|| mismatch("the response's unit"))?;
-    let axis = |(a, b): (&Axis, &Axis)| match (&a.coordinates, &b.coordinates) {
-        (Coordinates::Grid { values, unit }, Coordinates::Grid { unit: known, .. }) => {
-            let scale = unit.factor_to(known).ok_or_else(|| mismatch(&a.name))?;
-            let values = values.iter().map(|v| v * scale).collect();
-            Ok(Axis::grid(&a.name, values, known.clone()))
-        }
-        _ => Ok(a.clone()),
-    };
-    let axes = ours.axes.iter().zip(&theirs.axes).map(axis).collect::<Result<_, Stop>>()?;
-    Ok((Layout { name: ours.name.clone(), unit: theirs.unit.clone(), axes }, factor))
 }

@@ -25,6 +25,7 @@ use super::{predict, stream};
 use crate::stage::inverse_problem::InverseProblem;
 use crate::study::Study;
 use crate::study::file::Against;
+use crate::study::unknowns::Unknown;
 
 /// Results of the validation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -135,8 +136,12 @@ impl Work<'_> {
         let mut failed = Vec::new();
         let mut cases = vec![self.case("map", &calibrated.outcome.map[..d], &mut failed)?];
         if self.study.validate.against == Some(Against::Reference) {
-            let point: Vec<f64> =
-                self.study.parameters.iter().filter_map(|p| p.reference).collect();
+            // The reference of a field is its mean or median.
+            let of_fields = |unknown: &Unknown| unknown.of_field().then_some(0.0);
+            let both = self.study.parameters.iter().zip(&self.study.unknowns);
+            let point: Vec<f64> = both
+                .filter_map(|(p, unknown)| p.reference.or_else(|| of_fields(unknown)))
+                .collect();
             cases.push(self.case("reference", &point, &mut failed)?);
         }
         let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);

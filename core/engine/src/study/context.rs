@@ -1,6 +1,7 @@
 //! Second layer of checking: the sections of a study against each other.
 
 mod companion;
+mod cut;
 mod effects;
 mod gap;
 mod inputs;
@@ -12,6 +13,7 @@ mod outputs;
 mod quantities;
 mod reliability;
 mod runs;
+mod stochastic;
 
 use lacuna::data::{Layout, Parameter, Scenario};
 use lacuna::math::moments;
@@ -45,6 +47,8 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     runs(study, &mut complaints);
     more_runs::refinement(study, &mut complaints);
     more_runs::sequential(study, &mut complaints);
+    stochastic::check(study, &mut complaints);
+    cut::check(study, &mut complaints);
     validation(study, &mut complaints);
     if let Some(model) = &study.model {
         for (place, scenario) in study.scenarios.iter().enumerate() {
@@ -197,7 +201,7 @@ fn parameters(study: &Study, complaints: &mut Complaints<'_>) {
                 .say(format!("there are two parameters `{}`", parameter.name))
                 .help("give each `[[parameter]]` its own name");
         }
-        if study.surrogate.is_some() && !study.unknowns[i].of_population {
+        if study.surrogate.is_some() && !study.unknowns[i].of_population() {
             let population = study.dependence.population_of(i);
             let path = match population {
                 Some(population) => format!("parameter.{}.population", population.name),
@@ -297,7 +301,8 @@ fn validation(study: &Study, complaints: &mut Complaints<'_>) {
     if study.validate.against.is_some() {
         let scale = |j: usize| study.dependence.populations.iter().any(|p| p.scale == j);
         let without = study.parameters.iter().enumerate().filter(|(_, p)| p.reference.is_none());
-        for (_, parameter) in without.filter(|(j, _)| !scale(*j)) {
+        for (_, parameter) in without.filter(|(j, _)| !scale(*j) && !study.unknowns[*j].of_field())
+        {
             complaints
                 .at("validate.against")
                 .say(format!("the parameter `{}` has no `reference`", parameter.name))

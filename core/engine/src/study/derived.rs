@@ -128,7 +128,8 @@ fn needed<'s>(study: &'s Study, name: &str) -> Vec<&'s DerivedSection> {
     let mut needed: Vec<&DerivedSection> = find(name).into_iter().collect();
     let mut next = 0;
     while let Some(section) = needed.get(next) {
-        for used in lacuna::expression::names(&section.expression, &[]).unwrap_or_default() {
+        let fields: Vec<&str> = study.fields.iter().map(|field| field.name.as_str()).collect();
+        for used in lacuna::expression::names(&section.expression, &fields).unwrap_or_default() {
             let more = find(&used).filter(|s| !needed.iter().any(|n| n.name == s.name));
             needed.extend(more);
         }
@@ -141,6 +142,9 @@ fn needed<'s>(study: &'s Study, name: &str) -> Vec<&'s DerivedSection> {
 fn scope(study: &Study, name: &str, scenario: Option<usize>) -> Result<Known, Fault> {
     let mut scope = Scope::new();
     let (mut units, mut parameters) = (BTreeMap::new(), Vec::new());
+    for field in &study.fields {
+        scope.field(field.clone())?;
+    }
     for (i, unknown) in study.unknowns.iter().enumerate() {
         if unknown.is_known_in(scenario) {
             scope.unknown(&unknown.name)?;

@@ -3,15 +3,16 @@
 //! A section that chooses a plugin with `use` has keys of the engine's, which stand here, beside
 //! the plugin's own options.
 
+mod sampler;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::effect::On;
-use lacuna::plugin::sampler::Start;
 use lacuna::text::file_name::FileName;
-use lacuna::text::values::{Count, Fraction, Name, Positive};
+use lacuna::text::values::{Count, Name, Positive};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,7 @@ pub use super::noise::{InstrumentNoise, NoiseSection};
 pub use super::scenario::{FunctionSection, ScenarioSection};
 pub use lacuna::text::quantity::Quantity;
 pub use lacuna::text::response::{Axes, AxisSection, GridSection, ResponseSection};
+pub use sampler::{SamplerKeys, StopRule};
 
 /// Tables inside a section that a study may leave out: `false` takes out what another study has.
 pub(super) const OPTIONAL: [(&str, &str); 3] =
@@ -74,6 +76,11 @@ pub struct ParameterSection {
     /// well a sampler moves, and not the posterior.
     #[serde(default, skip_serializing_if = "CoordinatesKey::is_auto")]
     pub coordinates: CoordinatesKey,
+    /// True if the data of this study must not update the parameter, because a model that is known to be wrong would
+    /// distort it: its posterior is its prior, which may be the posterior of an earlier run, and the other parameters have
+    /// their posterior given each of its values (cut distribution, modular Bayesian analysis).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub cut: bool,
     /// Symbol used in figures, such as `x1`. Default: the name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub symbol: Option<String>,
@@ -107,6 +114,12 @@ pub struct ModelKeys {
     /// `{ damping = "base + slope * gas_fraction" }`.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub computed: BTreeMap<String, String>,
+    /// Name of the input that receives the seed of a run, for a model whose response is random: a whole number from 1 to
+    /// 2147483647 that depends on the seed of the study, the inputs of the run and, if a likelihood is estimated from
+    /// several runs, the number of the run among them. The same inputs and the same seed must give the same response.
+    /// Default: the model is deterministic.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<Name>,
 }
 
 /// The engine's keys of `[design]`.
@@ -333,41 +346,6 @@ pub struct EffectKeys {
     /// unknowns everywhere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub by: Option<String>,
-}
-
-/// The engine's keys of `[sampler]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-pub struct SamplerKeys {
-    /// Burn-in: fraction of the steps, from the start of each chain, that is discarded from every summary.
-    pub burn_in: Fraction,
-    /// Starting points of the chains. Default: those recommended by the sampler, which are around the posterior maximum
-    /// unless its page says otherwise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub start: Option<Start>,
-    /// Stopping rule: sampling continues beyond the sampler's own number of steps until this is satisfied. Default: the
-    /// sampler's own number of steps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stop: Option<StopRule>,
-}
-
-/// Stopping rule of a sampler.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct StopRule {
-    /// Effective sample size (ESS) to reach: the smallest over all unknowns, of bulk and tail ESS, after the burn-in.
-    pub effective_sample_size: Count,
-    /// Maximum number of steps of each chain, reached even if the ESS is not. Default: fifty times the sampler's own
-    /// number of steps.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub max_steps: Option<Count>,
-}
-
-impl Default for SamplerKeys {
-    fn default() -> Self {
-        let burn_in = Fraction::new(0.5).unwrap_or_else(|_| unreachable!("0.5 is a fraction"));
-        Self { burn_in, start: None, stop: None }
-    }
 }
 
 /// Checks performed after the calibration.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use lacuna::data::Unit;
+use lacuna::data::{Field, Unit};
 use lacuna::expression::{Data, Fault, Program, Scope};
 use lacuna::plugin::Given;
 use lacuna::text::{Complaints, Node, Problems};
@@ -27,7 +27,8 @@ impl Study {
     /// of names and units.
     pub fn computed(&self, scenario: usize) -> Result<Option<Computed>, Vec<Fault>> {
         let texts = expressions(self);
-        if texts.is_empty() {
+        let by_place = self.fields_by_place();
+        if texts.is_empty() && by_place.is_empty() {
             return Ok(None);
         }
         let mut scope = Scope::new();
@@ -36,6 +37,9 @@ impl Study {
         let one = |fault: Fault| vec![fault];
         for function in &self.scenarios[scenario].functions {
             scope.function(function.clone()).map_err(one)?;
+        }
+        for field in &self.fields {
+            scope.field(field.clone()).map_err(one)?;
         }
         for (i, unknown) in self.unknowns.iter().enumerate() {
             if unknown.acts_in(scenario) && !texts.contains_key(&unknown.name) {
@@ -55,13 +59,26 @@ impl Study {
         for (name, text) in texts {
             scope.define(name, text).map_err(one)?;
         }
-        let names: Vec<String> = texts.keys().cloned().collect();
+        let mut names: Vec<String> = texts.keys().cloned().collect();
+        for field in by_place {
+            for (name, x) in field.inputs().into_iter().zip(&field.at) {
+                scope
+                    .result(&name, &format!("{}({x} {{{}}})", field.name, place_unit(field)))
+                    .map_err(one)?;
+                names.push(name);
+            }
+        }
         let outputs: Vec<&str> = names.iter().map(String::as_str).collect();
         let program = scope.compile(&outputs)?;
         let found = scope.check_units(&units)?;
         let unit = |name: &String| found.get(name).cloned().unwrap_or_default();
         Ok(Some(Computed { units: names.iter().map(unit).collect(), names, parameters, program }))
     }
+}
+
+/// Unit of the places of a field, as an expression writes it.
+fn place_unit(field: &Field) -> &str {
+    if field.at_unit == Unit::dimensionless() { "1" } else { field.at_unit.as_str() }
 }
 
 /// `[model] computed`.
@@ -90,8 +107,14 @@ pub(super) fn all_given(study: &Study) -> Vec<Given> {
         }
     };
     let computed = study.computed(0).ok().flatten();
+    let by_coefficients = study.model_takes_fields();
     for (parameter, unknown) in study.parameters.iter().zip(&study.unknowns) {
-        add(&unknown.name, Some(&parameter.unit));
+        if by_coefficients || !unknown.of_field() {
+            add(&unknown.name, Some(&parameter.unit));
+        }
+    }
+    for field in study.fields_by_place() {
+        field.inputs().iter().for_each(|name| add(name, Some(&field.unit)));
     }
     for name in expressions.keys() {
         let unit = computed
@@ -104,6 +127,9 @@ pub(super) fn all_given(study: &Study) -> Vec<Given> {
     }
     for (name, quantity) in study.model.iter().flat_map(|model| &model.common.fixed) {
         add(name, quantity.unit.as_ref());
+    }
+    if let Some(seed) = study.model.as_ref().and_then(|model| model.common.seed.as_ref()) {
+        add(seed.as_str(), None);
     }
     given
 }

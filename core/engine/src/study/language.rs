@@ -18,7 +18,7 @@ pub fn schema() -> Value {
     table::describe(&mut language);
     language
         .required("study")
-        .required("parameter")
+        .required_without("parameter", "field")
         .required_without("response", "target")
         .section_in::<dyn Surrogate, NoKeys>("numerical_error", "surrogate")
         .section_in::<dyn Reader, NoKeys>("low_fidelity", "simulations")

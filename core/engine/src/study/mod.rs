@@ -5,6 +5,7 @@ mod context;
 pub mod dependence;
 pub mod derived;
 pub mod fidelity;
+pub mod field;
 pub mod file;
 pub mod forward;
 pub mod gap;

@@ -2,8 +2,9 @@
 
 use std::ops::Deref;
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use lacuna::data::{Dependence, Layouts, Parameter, Scenario};
+use lacuna::data::{Dependence, Field, Layouts, Parameter, Scenario};
 use lacuna::plugin::registry::Section;
 use lacuna::plugin::{Effect, Given};
 use lacuna::text::quantity::Quantity;
@@ -11,6 +12,7 @@ use toml::Table;
 
 use super::dependence::Sections;
 use super::fidelity::{LowFidelity, NumericalError};
+use super::field::FieldSection;
 use super::file::{DerivedSection, EffectKeys, StudySection, ValidateSection};
 use super::forward::ForwardSection;
 use super::gap::Gap;
@@ -48,6 +50,10 @@ pub struct Study {
     pub dependence: Dependence,
     /// `[[dependence]]` and `[[constraint]]`.
     pub dependence_sections: Sections,
+    /// Random fields, whose coefficients are the last parameters.
+    pub fields: Vec<Arc<Field>>,
+    /// `[[field]]`.
+    pub field_sections: Vec<FieldSection>,
     /// Parameters by group.
     pub hierarchy: Hierarchy,
     /// Name and scenario behind each parameter, in the same order.
@@ -116,6 +122,8 @@ impl Study {
             scenarios,
             dependence: Dependence::default(),
             dependence_sections: Sections::default(),
+            fields: self.fields.clone(),
+            field_sections: self.field_sections.clone(),
             hierarchy: Hierarchy::default(),
             unknowns,
             given: Vec::new(),

@@ -14,9 +14,10 @@ use toml::Table;
 
 use super::dependence::{Sections, dependence};
 use super::fidelity::{low_fidelity, numerical_error};
+use super::field::{enter, fields};
 use super::file::{OPTIONAL, ParameterSection, ResponseSection, StudySection, ValidateSection};
 use super::forward::forward;
-use super::gap::companion::companion;
+use super::gap::companion::{Companion, companion};
 use super::gap::gap;
 use super::hierarchy::{Hierarchy, groups_as_scenarios, trained};
 pub use super::libraries::Use;
@@ -179,6 +180,7 @@ fn structure(
     };
     let directory = directory(path, root);
     let scenarios = scenarios(root, &directory, problems);
+    let fields = fields(root, &directory, problems);
     let before = problems.len();
     let plugins = PluginSections::read(root, problems);
     let numerical_error = numerical_error(root, problems);
@@ -208,17 +210,19 @@ fn structure(
         }
         _ => Some(Vec::new()),
     };
-    let (scenarios, sections) = scenarios?;
+    let (mut scenarios, sections) = scenarios?;
     let (sections_of_parameters, mut dependence_sections) = (parameters?, dependence_sections?);
     dependence_sections.read_runs(&sections_of_parameters, &directory, root, problems);
     let prior = |section: &ParameterSection| dependence_sections.prior(section);
-    let (parameters, unknowns, drawn) =
+    let (mut parameters, mut unknowns, drawn) =
         unknowns(&sections_of_parameters, &scenarios, &plugins, prior, root, problems);
     if problems.len() > before {
         return None;
     }
+    let (field_sections, fields) = fields?;
+    enter(&fields, &mut scenarios, (&mut parameters, &mut unknowns));
     let mut about = about?;
-    let own = (parameters.as_slice(), unknowns.as_slice());
+    let own = (parameters.as_slice(), unknowns.as_slice(), fields.as_slice());
     let dependence = dependence(&dependence_sections, drawn, own, about.seed, root, problems)?;
     about.directory = None;
     let name = name(&mut about, path, root, problems)?;
@@ -234,6 +238,8 @@ fn structure(
         scenarios,
         dependence,
         dependence_sections,
+        fields,
+        field_sections,
         hierarchy: Hierarchy::of(sections_of_parameters),
         unknowns,
         given: Vec::new(),
@@ -255,19 +261,20 @@ fn structure(
     study.given = inputs::all_given(&study);
     study.hierarchy.trained = trained(&study, root);
     if let Some(node) = root.find("gap.companion") {
-        let own = problems.within("gap", |problems| {
-            problems.within("companion", |problems| companion(&study, node, problems))
-        });
-        study.gap.companion = Some(Box::new(own?));
+        study.gap.companion = Some(Box::new(companion_of(&study, node, problems)?));
     }
-    match resolved::table(&study, response?.as_ref(), &sections) {
-        Ok(resolved) => study.resolved = resolved,
-        Err(error) => {
-            problems.report(None, format!("the study with its defaults {error}"));
-            return None;
-        }
-    }
+    let resolved = resolved::table(&study, response?.as_ref(), &sections).map_err(|error| {
+        problems.report(None, format!("the study with its defaults {error}"));
+    });
+    study.resolved = resolved.ok()?;
     Some(study)
+}
+
+/// `[gap.companion]`.
+fn companion_of(study: &Study, node: &Node, problems: &mut Problems) -> Option<Companion> {
+    problems.within("gap", |problems| {
+        problems.within("companion", |problems| companion(study, node, problems))
+    })
 }
 
 /// Third layer: what the plugins need of the machine.

@@ -27,7 +27,7 @@ pub(super) fn table(
     let first = |(j, (_, unknown)): &(usize, (&Parameter, &Unknown))| {
         let again = unknown.member.is_some()
             && study.unknowns[..*j].iter().any(|other| other.name == unknown.name);
-        !again && !unknown.of_population
+        !again && !unknown.of_population() && !unknown.of_field()
     };
     let parameters: Result<Vec<Table>, _> = study
         .parameters
@@ -66,27 +66,20 @@ pub(super) fn table(
         whole.insert("plugins".to_owned(), to_table(&study.libraries.section)?.into());
     }
     whole.insert("parameter".to_owned(), parameters?.into());
-    if !study.starts.is_empty() {
-        let starts: Result<Vec<Table>, _> = study.starts.iter().map(to_table).collect();
-        whole.insert("start".to_owned(), starts?.into());
-    }
+    let mut list = |name: &str, tables: Result<Vec<Table>, Unwritable>| {
+        let tables = tables?;
+        if !tables.is_empty() {
+            whole.insert(name.to_owned(), tables.into());
+        }
+        Ok(())
+    };
     let Sections { dependence, constraint, .. } = &study.dependence_sections;
-    if !dependence.is_empty() {
-        let dependence: Result<Vec<Table>, _> = dependence.iter().map(to_table).collect();
-        whole.insert("dependence".to_owned(), dependence?.into());
-    }
-    if !constraint.is_empty() {
-        let constraint: Result<Vec<Table>, _> = constraint.iter().map(to_table).collect();
-        whole.insert("constraint".to_owned(), constraint?.into());
-    }
-    if !study.derived_sections.is_empty() {
-        let derived: Result<Vec<Table>, _> = study.derived_sections.iter().map(to_table).collect();
-        whole.insert("derived".to_owned(), derived?.into());
-    }
-    if !scenarios.is_empty() {
-        let scenarios: Result<Vec<Table>, _> = scenarios.iter().map(to_table).collect();
-        whole.insert("scenario".to_owned(), scenarios?.into());
-    }
+    list("field", study.field_sections.iter().map(to_table).collect())?;
+    list("start", study.starts.iter().map(to_table).collect())?;
+    list("dependence", dependence.iter().map(to_table).collect())?;
+    list("constraint", constraint.iter().map(to_table).collect())?;
+    list("derived", study.derived_sections.iter().map(to_table).collect())?;
+    list("scenario", scenarios.iter().map(to_table).collect())?;
     if let Some(response) = response {
         whole.insert("response".to_owned(), to_table(response)?.into());
     }

@@ -93,6 +93,7 @@ impl ScenarioSection {
             labels: self.labels.clone(),
             values,
             functions,
+            fields: Vec::new(),
             unmeasured: !self.measured,
         })
     }
@@ -109,7 +110,8 @@ fn heading(text: &str) -> Result<(&str, Unit), String> {
 }
 
 impl FunctionSection {
-    fn read(&self, name: &str, directory: &Path) -> Result<Function, String> {
+    /// Reads the table as a function of this name.
+    pub(super) fn read(&self, name: &str, directory: &Path) -> Result<Function, String> {
         let path = directory.join(&self.path);
         let wrong = |what: String| format!("{}: {what}", path.display());
         let mut table = csv::ReaderBuilder::new()

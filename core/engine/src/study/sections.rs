@@ -12,6 +12,7 @@ use lacuna::text::file_name::FileName;
 use lacuna::text::{Complaints, Node, Problems, nearest};
 use serde::de::DeserializeOwned;
 
+use super::field::FieldSection;
 use super::file::{
     Axes, DerivedSection, EffectKeys, ParameterSection, ResponseSection, ScenarioSection,
     StudySection,
@@ -49,7 +50,7 @@ pub(super) fn table<T: DeserializeOwned>(
 
 pub(super) fn parameters(root: &Node, problems: &mut Problems) -> Option<Vec<ParameterSection>> {
     let list = root.get("parameter").map(Node::elements).unwrap_or_default();
-    if list.is_empty() {
+    if list.is_empty() && root.get("field").is_none() {
         let place = root.get("parameter").map_or(&root.place, |node| &node.place).clone();
         problems
             .report(Some(place), "the study has no unknowns")
@@ -92,6 +93,11 @@ pub(super) fn effects(
 /// `[[quantity]]`.
 pub(super) fn quantities(root: &Node, problems: &mut Problems) -> Option<Vec<QuantitySection>> {
     named(root, "quantity", problems, |node, problems| section(node, None, problems))
+}
+
+/// `[[field]]`.
+pub(super) fn fields(root: &Node, problems: &mut Problems) -> Option<Vec<FieldSection>> {
+    named(root, "field", problems, decode)
 }
 
 /// `[[start]]`.

@@ -19,6 +19,7 @@ use serde::de::DeserializeOwned;
 use toml::Table;
 
 use super::dependence::{ConstraintSection, DependenceSection};
+use super::field::FieldSection;
 use super::file::{
     DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, LowFidelitySection, MeasurementKeys,
     ModelKeys, NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys,
@@ -129,6 +130,7 @@ sections! {
     study: table(StudySection);
     plugins: table(PluginsSection);
     parameter: list(ParameterSection);
+    field: list(FieldSection);
     start: list(StartSection);
     dependence: list(DependenceSection);
     constraint: list(ConstraintSection);
@@ -218,7 +220,7 @@ mod tests {
 
     #[test]
     fn keys_of_the_engine_stay_when_a_plugin_changes() {
-        assert_eq!(common_keys("sampler"), ["burn_in", "start", "stop"]);
+        assert_eq!(common_keys("sampler"), ["burn_in", "start", "stop", "imputations"]);
         assert_eq!(common_keys("effect"), ["name", "on", "by"]);
         assert_eq!(common_keys("executor"), [""; 0]);
         assert_eq!(common_keys("validate"), [""; 0]);

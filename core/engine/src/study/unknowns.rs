@@ -19,36 +19,67 @@ pub struct Unknown {
     /// Group to which it belongs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub member: Option<Member>,
-    /// True for location and scale of a population, on which no response depends directly.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub of_population: bool,
+    /// Kind of the unknown.
+    #[serde(skip_serializing_if = "is_parameter")]
+    pub kind: UnknownKind,
     /// True if bounds of its value are known and no distribution; its prior is then that of the design points.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub interval: bool,
+    /// True if the data do not update it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub cut: bool,
+}
+
+/// Kinds of unknowns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UnknownKind {
+    /// A parameter of the model.
+    Parameter,
+    /// Location or scale of a population, on which no response depends directly.
+    Population,
+    /// A coefficient of a random field.
+    Field,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature of `skip_serializing_if`")]
+fn is_parameter(kind: &UnknownKind) -> bool {
+    *kind == UnknownKind::Parameter
 }
 
 impl Unknown {
+    /// Returns true for location and scale of a population.
+    pub fn of_population(&self) -> bool {
+        self.kind == UnknownKind::Population
+    }
+
+    /// Returns true for a coefficient of a random field.
+    pub fn of_field(&self) -> bool {
+        self.kind == UnknownKind::Field
+    }
+
     /// An unknown that all scenarios share.
     pub fn shared(name: &str) -> Self {
         Self {
             name: name.to_owned(),
             scenario: None,
             member: None,
-            of_population: false,
+            kind: UnknownKind::Parameter,
             interval: false,
+            cut: false,
         }
     }
 
     /// Returns true if it acts in a scenario.
     pub fn acts_in(&self, scenario: usize) -> bool {
-        !self.of_population
+        !self.of_population()
             && self.scenario.is_none_or(|own| own == scenario)
             && self.member.as_ref().is_none_or(|own| own.scenarios.contains(&scenario))
     }
 
     /// Returns true if it has one value for all scenarios.
     pub fn is_shared(&self) -> bool {
-        self.scenario.is_none() && self.member.is_none() && !self.of_population
+        self.scenario.is_none() && self.member.is_none() && !self.of_population()
     }
 
     /// Returns true if expressions of a scenario, or of none, may use it.
@@ -93,7 +124,8 @@ pub(super) fn unknowns(
             reference: section.reference,
         });
         let interval = matches!(section.prior, Some(Prior::Interval { .. }));
-        unknowns.push(Unknown { name, scenario, member: None, of_population: false, interval });
+        let cut = section.cut;
+        unknowns.push(Unknown { scenario, interval, cut, ..Unknown::shared(&name) });
     };
     let named: Vec<&str> =
         scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();

@@ -1,8 +1,11 @@
 //! Fits to published functions of many inputs.
 
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use lacuna::data::{Layout, Parameter};
+use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::Design as _;
 use lacuna::plugin::surrogate::{Emulator, Surrogate, Training};
@@ -88,17 +91,79 @@ fn a_hundred_inputs_have_products_of_two_by_default() {
     assert!(sets.sets.last().unwrap().degree >= 4);
 }
 
-#[test]
-#[ignore = "takes a minute: cargo test -p lacuna-plugins --lib -- --ignored --nocapture errors_of_many_inputs"]
-fn errors_of_many_inputs() {
-    let cases: [(Function, &[usize]); 6] = [
+/// The functions of the tables and the numbers of runs.
+fn cases() -> [(Function, &'static [usize]); 6] {
+    [
         (borehole(), &[20, 100, 300]),
         (welch(), &[100, 200, 500]),
         (morris(), &[200, 500]),
         (diffusion(50), &[100, 200, 500]),
         (diffusion(100), &[100, 200, 500]),
         (uqlab(), &[100, 200, 300, 500]),
-    ];
+    ]
+}
+
+/// Writes points, values and slopes of a function as a table. Coordinates and slopes are those of the standard variables:
+/// uniform from -1 to 1, or standard normal. The slopes are central differences.
+fn export(path: &Path, function: &Function, points: &Matrix) {
+    let scales: Vec<(f64, f64)> = function
+        .designs
+        .iter()
+        .map(|design| match design {
+            Distribution::Uniform([low, high]) => (0.5 * (low + high), 0.5 * (high - low)),
+            _ => (0.0, 1.0),
+        })
+        .collect();
+    let mut text = String::new();
+    for point in points.iter_rows() {
+        let mut cells = vec![(function.value)(point)];
+        cells.extend(point.iter().zip(&scales).map(|(x, (middle, scale))| (x - middle) / scale));
+        for (j, (_, scale)) in scales.iter().enumerate() {
+            let step = 1e-5;
+            let at = |side: f64| {
+                let mut moved = point.to_vec();
+                moved[j] += side * step * scale;
+                (function.value)(&moved)
+            };
+            cells.push((at(1.0) - at(-1.0)) / (2.0 * step));
+        }
+        text += &cells.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        text.push('\n');
+    }
+    fs::write(path, text).unwrap();
+}
+
+#[test]
+#[ignore = "for bench/many_inputs.py: LACUNA_RUNS=FOLDER cargo test -p lacuna-plugins --lib -- --ignored runs_of_many_inputs"]
+fn runs_of_many_inputs() {
+    let folder = PathBuf::from(std::env::var_os("LACUNA_RUNS").expect("LACUNA_RUNS is a folder"));
+    for (function, sizes) in &cases() {
+        let name: String = function.name.chars().filter(char::is_ascii_alphanumeric).collect();
+        let law = if matches!(function.designs[0], Distribution::Normal(_)) { "n" } else { "u" };
+        for &runs in *sizes {
+            for seed in [1, 2] {
+                let case = Case::new(function, runs, seed);
+                export(
+                    &folder.join(format!("{name}-{law}-{runs}-{seed}.csv")),
+                    function,
+                    &case.points,
+                );
+                export(&folder.join(format!("{name}-{law}-new.csv")), function, &case.fresh);
+                // Half as many runs, for gradients that cost as much as a run.
+                let half = Case::new(function, runs / 2, seed);
+                export(
+                    &folder.join(format!("{name}-{law}-{runs}-{seed}-half.csv")),
+                    function,
+                    &half.points,
+                );
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "takes a minute: cargo test -p lacuna-plugins --lib -- --ignored --nocapture errors_of_many_inputs"]
+fn errors_of_many_inputs() {
     let plain = PolynomialChaos {
         q_norm: Some(QNorm::Fixed(1.0)),
         max_interaction: Some(100),
@@ -113,7 +178,7 @@ fn errors_of_many_inputs() {
         ("Gaussian process", Box::new(GaussianProcess::default())),
     ];
     println!("relative error at 2000 new points (stated error; seconds), for two designs");
-    for (function, sizes) in &cases {
+    for (function, sizes) in &cases() {
         for &runs in *sizes {
             for (name, surrogate) in &surrogates {
                 let mut line = format!("{}, {runs} runs, {name}:", function.name);

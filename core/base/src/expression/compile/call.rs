@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use super::value::{Argument, Kind, Value, fit};
 use super::{Compiler, Fault};
-use crate::data::Interpolation;
+use crate::data::{Field, Interpolation};
 use crate::expression::curve::Curve;
 use crate::expression::function::{Action as Does, Function, Reduction};
-use crate::expression::operator::Binary;
-use crate::expression::program::Action;
+use crate::expression::operator::{Binary, Unary};
+use crate::expression::program::{Action, Place};
 
 impl Compiler {
     pub(super) fn call(
@@ -151,6 +151,9 @@ impl Compiler {
     /// Compiles a call of a function given by a table.
     pub(super) fn table(&mut self, name: &str, argument: &Argument) -> Result<Value, Fault> {
         let at = argument.number()?;
+        if let Some(field) = self.fields.get(name).cloned() {
+            return self.field(&field, at, &argument.span);
+        }
         let curve = if let Some(curve) = self.curves.get(name) {
             *curve
         } else {
@@ -161,8 +164,47 @@ impl Compiler {
             self.curves.insert(name.to_owned(), self.tables.curves.len() - 1);
             self.tables.curves.len() - 1
         };
+        Ok(self.interpolated(curve, at))
+    }
+
+    fn interpolated(&mut self, curve: usize, at: Value) -> Value {
         let place = self.emit(Action::Interpolate(curve, at.place), at.place.length);
-        Ok(Value { place, ..at })
+        Value { place, ..at }
+    }
+
+    /// Compiles the value of a random field at a place: its level and the sum of its modes times their coefficients.
+    fn field(&mut self, field: &Field, at: Value, span: &Range<usize>) -> Result<Value, Fault> {
+        let coefficients = self.names.get(&field.vector()).copied();
+        let given = coefficients.filter(|value| value.place.length == field.terms());
+        let Some(coefficients) = given else {
+            let message = format!("the coefficients of the field `{}` are not known", field.name);
+            return Err(Fault::new(span.clone(), message));
+        };
+        let first = self.curves_of(field);
+        let mut sum = self.interpolated(first, at);
+        for k in 0..field.terms() {
+            let mode = self.interpolated(first + 1 + k, at);
+            let place =
+                Place { start: coefficients.place.start + k, length: 1, ..coefficients.place };
+            let coefficient = Value { kind: Kind::Number, place, vector: false };
+            let term = self.binary(Binary::Multiply, mode, coefficient);
+            sum = self.binary(Binary::Add, sum, term);
+        }
+        Ok(if field.log_normal { self.unary(Unary::Exp, sum) } else { sum })
+    }
+
+    /// Index in the tables of the level of a field, which its modes follow.
+    fn curves_of(&mut self, field: &Field) -> usize {
+        if let Some(first) = self.curves.get(&field.name) {
+            return *first;
+        }
+        let first = self.tables.curves.len();
+        let curves = std::iter::once(&field.level[..]).chain(field.modes.iter_rows());
+        let curves = curves
+            .map(|values| Curve::new(field.at.clone(), values.to_vec(), Interpolation::Spline));
+        self.tables.curves.extend(curves.map(Arc::new));
+        self.curves.insert(field.name.clone(), first);
+        first
     }
 }
 

@@ -4,6 +4,7 @@
 mod densities;
 mod derivatives;
 mod faults;
+mod fields;
 mod language;
 mod parts;
 mod tables;

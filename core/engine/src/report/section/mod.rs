@@ -3,6 +3,7 @@
 pub mod banner;
 mod ensemble;
 pub mod evidence;
+mod fields;
 mod forward;
 pub mod headline;
 mod intervals;
@@ -27,6 +28,7 @@ use crate::gap::report::View;
 use crate::page::scale::ShownUnit;
 use crate::page::{Numbers, Section};
 
+pub use fields::field_table;
 pub use forward::share_table;
 pub use intervals::bounds_table;
 pub use populations::population_table;
@@ -45,6 +47,7 @@ pub fn all(findings: &Findings, numbers: &mut Numbers) -> Vec<Section> {
         sampling::section(findings, numbers),
         posterior::section(findings, numbers),
         populations::section(findings.calibration.as_ref(), numbers),
+        fields::section(findings, numbers),
         evidence::section(findings),
         validation::section(findings, numbers),
         quantities::section(findings, numbers),

@@ -59,6 +59,15 @@ fn design_table(all: &[RareEvent]) -> Option<Table> {
                     significant(*share, 3),
                 ]);
             }
+            if event.error_variables > 0 {
+                table.row(vec![
+                    event.name.clone(),
+                    "errors of emulator and numerics".to_owned(),
+                    significant(point.distance, 4),
+                    String::new(),
+                    significant(point.error_importance, 3),
+                ]);
+            }
         }
     }
     (!empty).then_some(table)
@@ -69,8 +78,8 @@ fn probabilities(all: &[RareEvent], numbers: &mut Numbers) -> Markup {
         "Probabilities that a quantity exceeds a limit. Interval and coefficient of variation are those of the estimate; the \
          index is minus the standard normal quantile of the probability. Calls are those of the model, or of the emulator if \
          the study has one.",
-        "the distribution of the parameters alone: the errors of the emulator, of the model's numerics and of its form \
-         are not in the probability.",
+        "the distribution of the parameters, and the errors of emulator and numerics that the quantity includes. The error of \
+         the model's form and the scatter of measurements are not in the probability.",
         "an interval that is wide on the scale of the decision. First- and second-order methods have no interval.",
     );
     numbers.table(&reliability_table(all), &caption)
@@ -80,7 +89,7 @@ fn points(table: &Table, numbers: &mut Numbers) -> Markup {
     let caption = Caption::new(
         "Design points: the most probable points of the failure region, with the parameters in their units, and the share of \
          each parameter in the variance of the linearised limit state.",
-        "the distribution of the parameters alone.",
+        "the distribution of the parameters and the errors of emulator and numerics.",
         "the parameter with the largest share: its uncertainty matters most for the event.",
     );
     numbers.table(table, &caption)

@@ -6,6 +6,7 @@
 //! it; other optional keys are `null`.
 
 mod bounds;
+mod fields;
 mod gap;
 mod inputs;
 mod keys;

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::fields::{self, Field};
 use super::populations::{self, Population};
 use super::value::{ByName, Quantity};
 use crate::report::findings::{
@@ -21,6 +22,10 @@ pub struct Calibration {
     #[serde(skip_serializing_if = "ByName::is_empty")]
     #[schemars(extend("propertyNames" = { "title": "name" }))]
     pub populations: ByName<Population>,
+    /// Random fields (`[[field]]`).
+    #[serde(skip_serializing_if = "ByName::is_empty")]
+    #[schemars(extend("propertyNames" = { "title": "name" }))]
+    pub fields: ByName<Field>,
     /// Posterior correlation of the unknowns.
     pub correlation: Correlation,
     /// Acceptance rate over the chains, if the sampler has one.
@@ -176,6 +181,7 @@ impl Calibration {
         Self {
             parameters: named.map(|c| (c.name.clone(), Marginal::of(c))).collect(),
             populations: populations::by_name(found),
+            fields: fields::by_name(&findings.fields),
             correlation: Correlation::of(found),
             acceptance: Acceptance::of(&found.acceptance),
             chains: Chains {

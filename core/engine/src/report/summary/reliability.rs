@@ -6,8 +6,8 @@ use serde::Serialize;
 use super::value::{ByName, Quantity};
 use crate::report::findings::RareEvent;
 
-/// Probability that a quantity of interest exceeds a limit. It contains the distribution of the parameters, and none of the
-/// errors of the prediction.
+/// Probability that a quantity of interest exceeds a limit. It contains the distribution of the parameters, and the errors of
+/// emulator and numerics that the quantity includes; not those of the model's form and of measurements.
 #[allow(clippy::struct_field_names, reason = "the keys of the summary")]
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Probability {
@@ -37,6 +37,8 @@ pub struct Probability {
     pub calls: usize,
     /// Number of calls without an answer; they count as no failure.
     pub undefined: usize,
+    /// Number of standard normal variables of the errors of emulator and numerics, besides those of the parameters.
+    pub error_variables: usize,
     /// Number of calls at which the limit was exceeded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failures: Option<usize>,
@@ -59,6 +61,9 @@ pub struct DesignPoint {
     /// Share of each parameter in the variance of the linearised limit state.
     #[schemars(extend("propertyNames" = { "title": "parameter" }))]
     pub importance: ByName<Quantity>,
+    /// Share of the errors of emulator and numerics in this variance; absent without them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_importance: Option<Quantity>,
 }
 
 /// Probabilities by their names.
@@ -75,6 +80,7 @@ impl Probability {
             distance: point.distance.into(),
             values: named(&point.values),
             importance: named(&point.importance),
+            error_importance: (event.error_variables > 0).then(|| point.error_importance.into()),
         });
         Self {
             quantity: event.quantity.clone(),
@@ -89,6 +95,7 @@ impl Probability {
             interval: event.interval,
             calls: event.calls,
             undefined: event.undefined,
+            error_variables: event.error_variables,
             failures: event.failures,
             converged: event.converged,
             design_points: points.collect(),

@@ -1,5 +1,4 @@
-//! Made-up results with the shape, the units and the magnitudes of the mercury target study
-//! (Radaideh et al., arXiv 2202.03959); no number in it is a result.
+//! Made-up results with the shape, units and sizes of the mercury target study (Radaideh et al., arXiv 2202.03959).
 
 use lacuna::data::{Axis, FailedRun, Layout, Measurements, Parameter, Replicate, Unit};
 use lacuna::math::distribution::Distribution;
@@ -30,6 +29,7 @@ pub fn findings() -> Findings {
         title: "SNS first target station: mercury equation of state".into(),
         study: "sns".into(),
         seed: 20_220_415,
+        fields: Vec::new(),
         intervals: Vec::new(),
         prior: Vec::new(),
         version: "0.1.0".into(),

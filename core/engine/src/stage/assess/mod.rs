@@ -91,7 +91,8 @@ fn assess(study: &Study, all: &Artifacts<'_>) -> Result<Assessment, Stop> {
     let calibrated = all.calibrated.map(|kept| &kept.value);
     if let Some(problem) = all.problem {
         let errors = match (calibrated, &problem.data.value.measured) {
-            (Some(calibrated), Some(measured)) => {
+            // One response of a stochastic model cannot be compared with the data.
+            (Some(calibrated), Some(measured)) if !study.is_stochastic() => {
                 let parts = Parts::of(study, measured, problem)?;
                 let predictive = Parts::predicting(study, measured, problem)?;
                 let likelihoods = [parts.likelihood(), predictive.likelihood()];

@@ -8,8 +8,8 @@ use lacuna_linalg::Matrix;
 use super::some;
 use crate::assess::bounds::{self, AtBound, NEAR};
 use crate::assess::chains::{self, Chains};
-use crate::assess::{Finding, correlation, modes, population, prior};
-use crate::stage::calibrate::{Calibrated, Outcome, PopulationOutcome};
+use crate::assess::{Finding, correlation, estimate, modes, population, prior};
+use crate::stage::calibrate::{Calibrated, LikelihoodEstimate, Outcome, PopulationOutcome};
 use crate::study::Study;
 use crate::study::dependence::Earlier;
 
@@ -24,16 +24,28 @@ pub(super) fn findings(
         return Vec::new();
     }
     let mut found = convergence(&draws, outcome);
-    found.extend(some([
-        unvisited(&draws, outcome),
-        modes::unreached(outcome.best_draw.1 - outcome.map_log_density),
-    ]));
+    if let Some(own) = &outcome.estimate {
+        found.extend(of_estimate(own));
+    } else if outcome.cut.is_none() {
+        found.extend(some([
+            unvisited(&draws, outcome),
+            modes::unreached(outcome.best_draw.1 - outcome.map_log_density),
+        ]));
+    }
     found.extend(at_bounds(study, &draws, region));
     found.extend(conflicts(study, &draws));
     found.extend(correlated(study, &draws));
     found.extend(study.dependence_sections.earlier.iter().filter_map(of_run));
     found.extend(outcome.populations.iter().filter_map(of_population));
     found
+}
+
+fn of_estimate(own: &LikelihoodEstimate) -> Vec<Finding> {
+    if own.deterministic {
+        return vec![estimate::deterministic()];
+    }
+    let variance = estimate::variance(own.variance, own.runs);
+    some([variance, own.longest_stay.and_then(estimate::sticking)])
 }
 
 fn of_run(run: &Earlier) -> Option<Finding> {

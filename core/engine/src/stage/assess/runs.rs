@@ -135,7 +135,7 @@ fn by_parameter(
     };
     // Location and scale of a population are no inputs of the emulator.
     let inputs = study.parameters.iter().enumerate();
-    inputs.filter(|(j, _)| !study.unknowns[*j].of_population).flat_map(one).collect()
+    inputs.filter(|(j, _)| !study.unknowns[*j].of_population()).flat_map(one).collect()
 }
 
 fn share(values: &[f64], is: impl Fn(f64) -> bool) -> f64 {

@@ -59,7 +59,10 @@ impl<'a> Law<'a> {
             study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
         let errors = problem.allowances(study, &section.common, &measured.likelihood)?;
         let common = errors.iter().map(|error| size(error).clone()).collect();
-        let replicates = section.common.replicate_error.then_some(&measured.used);
+        // Replicates of a stochastic model scatter about no common curve.
+        let stochastic = problem.forward().is_stochastic();
+        let included = section.common.replicate_error && !stochastic;
+        let replicates = included.then_some(&measured.used);
         let fitted = if replicate_error::needs_best_fit(study, measured) {
             problem.best_fit(study, &measured.likelihood)?.response.clone()
         } else {

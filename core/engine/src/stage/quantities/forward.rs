@@ -9,12 +9,12 @@ use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
 use super::bounds::{self, BoundsFindings};
-use super::errors::Errors;
 use super::inputs::PropagatedInputs;
 use super::{Basis, Quantified, Work};
 use crate::sensitivity::{Indices, evaluations, indices};
 use crate::stage::inverse_problem::{InverseProblem, Route};
 use crate::stage::predict;
+use crate::stage::prediction_errors::Errors;
 use crate::stage::predictions::Chosen;
 use crate::study::Study;
 use crate::study::quantity::in_default;

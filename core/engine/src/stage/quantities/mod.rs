@@ -9,10 +9,8 @@
 
 mod about;
 mod bounds;
-mod errors;
 mod findings;
 mod forward;
-mod given;
 mod inputs;
 mod kept;
 
@@ -30,10 +28,10 @@ use serde_json::{Value, json};
 pub use self::about::{About, Described, Variant};
 use self::about::{PARAMETERS, described, variants};
 pub use self::bounds::{Bounds, BoundsFindings, End, Interval, PROBABILITIES, Range};
-use self::errors::Errors;
 pub use self::findings::{InputShare, QuantityFindings};
 pub use self::forward::{Bands, Propagated, runs};
 use super::calibrate::Calibrated;
+use super::prediction_errors::Errors;
 use super::predictions::Chosen;
 use super::{predict, stream};
 use crate::stage::inverse_problem::InverseProblem;

@@ -41,6 +41,9 @@ pub struct RareEvent {
     pub calls: usize,
     /// Number of calls without an answer.
     pub undefined: usize,
+    /// Number of standard normal variables of the errors of emulator and numerics that the probability contains.
+    #[serde(default)]
+    pub error_variables: usize,
     /// Number of calls at which the limit was exceeded.
     pub failures: Option<usize>,
     /// Points of the failure region nearest to the origin of the standard normal space.
@@ -60,6 +63,9 @@ pub struct FoundPoint {
     pub values: Vec<(String, f64)>,
     /// Share of each parameter in the variance of the linearised limit state.
     pub importance: Vec<(String, f64)>,
+    /// Share of the errors of emulator and numerics in it.
+    #[serde(default)]
+    pub error_importance: f64,
 }
 
 impl RareEvent {

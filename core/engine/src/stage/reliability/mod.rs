@@ -1,13 +1,13 @@
 //! Stage 6: probabilities of rare events.
 //!
 //! The limit state is the difference between a limit and a quantity of interest of the response: that of the emulator if the
-//! study has one, otherwise that of the model. It contains the uncertainty of the parameters and none of the errors of the
-//! prediction.
+//! study has one, otherwise that of the model. It contains the uncertainty of the parameters, and the errors of emulator and
+//! numerics that the quantity includes, which are functions of further standard normal variables.
 
 mod findings;
 mod state;
 
-use lacuna::plugin::reliability::{DesignPoint, Estimate, LimitState};
+use lacuna::plugin::reliability::{DesignPoint, Estimate};
 use lacuna::run::{Observer, Progress, Stop};
 use lacuna_run::{Kept, RunDirectory, Stage};
 use serde_json::{Value, json};
@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 pub use self::findings::{FoundPoint, RareEvent, RareEvents};
 use self::state::{Evaluation, OfPosterior, OfPrior};
 use super::calibrate::{Calibrated, Parts};
+use super::prediction_errors::Errors;
 use super::stream;
 use crate::posterior::Posterior;
 use crate::stage::inverse_problem::InverseProblem;
@@ -32,17 +33,23 @@ pub fn stage(
     let inputs = json!([
         problem.data.hash,
         problem.origin(),
+        problem.numerics().map(|n| &n.hash),
+        study.numerical_error.as_ref().map(|section| section.written.scales()),
         calibrated.map(|kept| &kept.hash),
         asked_for(study),
     ]);
     estimated(study, &inputs, run, observer, |work| {
         let evaluation = Evaluation::new(study, problem);
-        let parts = match &problem.data.value.measured {
-            Some(measured) if calibrated.is_some() => Some(Parts::of(study, measured, problem)?),
-            _ => None,
+        let of_priors = Errors::of_priors(study, problem)?;
+        let calibrated = calibrated.map(|kept| &kept.value);
+        let Some((measured, calibrated)) = problem.data.value.measured.as_ref().zip(calibrated)
+        else {
+            return work.all(&evaluation, &of_priors, None);
         };
-        let posterior = parts.as_ref().map(|parts| parts.posterior(study, problem));
-        work.all(&evaluation, posterior.as_ref().zip(calibrated.map(|kept| &kept.value)))
+        let parts = Parts::of(study, measured, problem)?;
+        let posterior = &parts.posterior(study, problem);
+        let errors = &Errors::of(study, measured, problem, &calibrated.outcome.map)?;
+        work.all(&evaluation, &of_priors, Some(Sampled { posterior, calibrated, errors }))
     })
 }
 
@@ -56,8 +63,9 @@ pub fn of_target(
 ) -> Result<Option<Kept<RareEvents>>, Stop> {
     let inputs = json!([calibrated.hash, asked_for(study)]);
     estimated(study, &inputs, run, observer, |work| {
-        let evaluation = Evaluation::of_numbers(study);
-        work.all(&evaluation, Some((posterior, &calibrated.value)))
+        let (evaluation, errors) = (Evaluation::of_numbers(study), &Errors::none());
+        let calibrated = &calibrated.value;
+        work.all(&evaluation, errors, Some(Sampled { posterior, calibrated, errors }))
     })
 }
 
@@ -101,6 +109,14 @@ fn estimated(
     Ok(Some(kept))
 }
 
+/// A posterior with its draws, and the errors of a prediction from it.
+#[derive(Clone, Copy)]
+struct Sampled<'a> {
+    posterior: &'a Posterior<'a>,
+    calibrated: &'a Calibrated,
+    errors: &'a Errors,
+}
+
 struct Work<'a> {
     study: &'a Study,
     progress: &'a Progress<'a>,
@@ -110,10 +126,11 @@ impl Work<'_> {
     fn all(
         &self,
         evaluation: &Evaluation<'_>,
-        posterior: Option<(&Posterior<'_>, &Calibrated)>,
+        of_priors: &Errors,
+        sampled: Option<Sampled<'_>>,
     ) -> Result<RareEvents, Stop> {
         let sections = self.study.reliability.iter();
-        let events = sections.map(|section| self.one(section, evaluation, posterior));
+        let events = sections.map(|section| self.one(section, evaluation, of_priors, sampled));
         Ok(RareEvents { events: events.collect::<Result<_, _>>()? })
     }
 
@@ -121,42 +138,43 @@ impl Work<'_> {
         &self,
         section: &ReliabilitySection,
         evaluation: &Evaluation<'_>,
-        posterior: Option<(&Posterior<'_>, &Calibrated)>,
+        of_priors: &Errors,
+        sampled: Option<Sampled<'_>>,
     ) -> Result<RareEvent, Stop> {
         let event = Event::of(self.study, section, &evaluation.asked).map_err(|misfits| {
             let first = misfits.into_iter().next().map_or_else(String::new, |m| m.message);
             Stop::new(format!("reliability `{}`: {first}", section.common.name.as_str()))
         })?;
-        match (event.source, posterior) {
+        let random = stream(self.study, "reliability").named(section.common.name.as_str());
+        match (event.source, sampled) {
             (Source::Prior, _) => {
-                let state = OfPrior { evaluation, event, parameters: &self.study.parameters };
-                let estimate = self.estimate(section, &state)?;
-                Ok(self.found(section, event, evaluation, estimate, |p| state.natural(&p.point)))
+                let errors = evaluation.variables(&event, of_priors)?;
+                let count = errors.count();
+                let parameters = &self.study.parameters;
+                let state = OfPrior { evaluation, event, parameters, errors };
+                let estimate = section.built.plugin.estimate(&state, &random, self.progress)?;
+                let natural = |p: &DesignPoint| state.natural(&p.point);
+                Ok(self.found(section, event, (evaluation, count), estimate, natural))
             }
-            (Source::Posterior, Some((posterior, calibrated))) => {
-                let state = OfPosterior::new(evaluation, event, posterior, calibrated)?;
-                let estimate = self.estimate(section, &state)?;
-                Ok(self.found(section, event, evaluation, estimate, |p| state.natural(&p.point)))
+            (Source::Posterior, Some(Sampled { posterior, calibrated, errors })) => {
+                let errors = evaluation.variables(&event, errors)?;
+                let count = errors.count();
+                let with = (errors, &random);
+                let state = OfPosterior::new(evaluation, event, posterior, calibrated, with)?;
+                let estimate = section.built.plugin.estimate(&state, &random, self.progress)?;
+                let natural = |p: &DesignPoint| state.natural(&p.point);
+                Ok(self.found(section, event, (evaluation, count), estimate, natural))
             }
             (Source::Posterior, None) => Err(Stop::new("the study has no posterior")
                 .help("state `distribution = \"prior\"` in `[[reliability]]`")),
         }
     }
 
-    fn estimate(
-        &self,
-        section: &ReliabilitySection,
-        state: &dyn LimitState,
-    ) -> Result<Estimate, Stop> {
-        let random = stream(self.study, "reliability").named(section.common.name.as_str());
-        section.built.plugin.estimate(state, &random, self.progress)
-    }
-
     fn found(
         &self,
         section: &ReliabilitySection,
         event: Event,
-        evaluation: &Evaluation<'_>,
+        (evaluation, error_variables): (&Evaluation<'_>, usize),
         estimate: Estimate,
         natural: impl Fn(&DesignPoint) -> Vec<f64>,
     ) -> RareEvent {
@@ -166,10 +184,15 @@ impl Work<'_> {
         let at = estimate.design_points.iter().map(&natural);
         let far = at.filter(|point| evaluation.is_beyond(point)).count();
         warnings.extend(extrapolated(evaluation.taken(), far));
-        let points = estimate.design_points.iter().map(|point| FoundPoint {
-            distance: point.distance,
-            values: names.iter().cloned().zip(natural(point)).collect(),
-            importance: names.iter().cloned().zip(point.importance()).collect(),
+        let points = estimate.design_points.iter().map(|point| {
+            let importance = point.importance();
+            let of_errors = &importance[importance.len() - error_variables..];
+            FoundPoint {
+                distance: point.distance,
+                values: names.iter().cloned().zip(natural(point)).collect(),
+                importance: names.iter().cloned().zip(importance.iter().copied()).collect(),
+                error_importance: of_errors.iter().sum(),
+            }
         });
         RareEvent {
             name: section.common.name.as_str().to_owned(),
@@ -185,6 +208,7 @@ impl Work<'_> {
             interval: estimate.interval,
             calls: estimate.calls,
             undefined: estimate.undefined,
+            error_variables,
             failures: estimate.failures,
             converged: estimate.converged,
             warnings,

@@ -4,20 +4,24 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use lacuna::data::Parameter;
 use lacuna::math::moments::mean;
+use lacuna::math::random::{Stream, normal};
 use lacuna::math::special::normal_cdf;
+use lacuna::plugin::discrepancy::ErrorPath;
 use lacuna::plugin::reliability::LimitState;
 use lacuna::plugin::{Forward, Target};
 use lacuna::run::Stop;
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix};
+use rayon::prelude::*;
 
 use crate::posterior::Posterior;
 use crate::stage::calibrate::Calibrated;
 use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::predict;
+use crate::stage::prediction_errors::{ErrorVariables, Errors};
 use crate::study::Study;
 use crate::study::derived::Derived;
-use crate::study::quantity::Asked;
+use crate::study::quantity::{Asked, needed};
 use crate::study::reliability::Event;
 
 /// Evaluation of the quantities of a study at points of its unknowns.
@@ -55,13 +59,33 @@ impl<'a> Evaluation<'a> {
         [0, 1].map(|i| self.occurred[i].swap(0, Ordering::Relaxed))
     }
 
+    /// The errors that the value of an event contains, as further variables.
+    pub fn variables<'e>(
+        &self,
+        event: &Event,
+        errors: &'e Errors,
+    ) -> Result<ErrorVariables<'e>, Stop> {
+        let needed = needed(&self.asked, event.value);
+        let asked = || self.asked.iter().zip(&needed).filter(|(_, needed)| **needed);
+        let included = |origin: &str| asked().any(|(asked, _)| asked.includes(origin));
+        let outputs: Vec<usize> =
+            asked().flat_map(|(asked, _)| asked.outputs().iter().copied()).collect();
+        ErrorVariables::of(errors, included, &outputs)
+            .map_err(|error| Stop::new(format!("the errors of the prediction: {error}")))
+    }
+
     /// Returns true if a point lies beyond the runs of the emulator.
     pub fn is_beyond(&self, point: &[f64]) -> bool {
         self.ranges.iter().zip(point).any(|((low, high), x)| x < low || x > high)
     }
 
-    /// Limit state of an event at natural points, one per row.
-    fn values(&self, event: &Event, points: &Matrix) -> Result<Vec<f64>, Stop> {
+    /// Limit state of an event at natural points, one per row, with errors at these values of their variables.
+    fn values(
+        &self,
+        event: &Event,
+        points: &Matrix,
+        (errors, variables): (&ErrorVariables<'_>, &Matrix),
+    ) -> Result<Vec<f64>, Stop> {
         let responses = match self.forward {
             Some(forward) => predict::responses(self.study, forward, points),
             None => vec![Vec::new(); points.rows()],
@@ -69,11 +93,20 @@ impl<'a> Evaluation<'a> {
         if let Some(reason) = self.forward.and_then(Forward::failure) {
             return Err(Stop::new(reason));
         }
-        let one = |(point, response): (&[f64], &Vec<f64>)| {
+        let needed = needed(&self.asked, event.value);
+        let one = |i: usize| {
+            let (point, response) = (points.row(i), &responses[i]);
             let derived: Vec<f64> = self.derived.iter().map(|d| d.value(point)).collect();
+            let paths = errors.paths(response, point, variables.row(i));
             let mut values: Vec<f64> = Vec::with_capacity(event.value + 1);
-            for asked in &self.asked[..=event.value] {
-                values.push(asked.value(|i| response[i], (point, &derived, &values)));
+            for (asked, needed) in self.asked.iter().zip(&needed) {
+                let own: Vec<&ErrorPath> =
+                    paths.iter().filter(|path| asked.includes(path.origin.as_str())).collect();
+                let with =
+                    |i: usize| response[i] + own.iter().map(|path| path.values[i]).sum::<f64>();
+                let context = (point, &derived[..], &values[..]);
+                let value = if *needed { asked.value(with, context) } else { f64::NAN };
+                values.push(value);
             }
             let value = values[event.value];
             let state = if event.above { event.limit - value } else { value - event.limit };
@@ -83,7 +116,7 @@ impl<'a> Evaluation<'a> {
             }
             state
         };
-        Ok(points.iter_rows().zip(&responses).map(one).collect())
+        Ok((0..points.rows()).into_par_iter().map(one).collect())
     }
 }
 
@@ -104,11 +137,13 @@ fn ranges(study: &Study, problem: &InverseProblem<'_>) -> Vec<(f64, f64)> {
     study.parameters.iter().map(|parameter| range(&parameter.name)).collect()
 }
 
-/// Limit state of independent priors: each variable is mapped through the inverse distribution function of a prior.
+/// Limit state of independent priors: each variable is mapped through the inverse distribution function of a prior; those of
+/// the errors follow.
 pub struct OfPrior<'a> {
     pub evaluation: &'a Evaluation<'a>,
     pub event: Event,
     pub parameters: &'a [Parameter],
+    pub errors: ErrorVariables<'a>,
 }
 
 /// Largest variable that is mapped: beyond it the distribution function rounds to one.
@@ -124,16 +159,24 @@ impl OfPrior<'_> {
 
 impl LimitState for OfPrior<'_> {
     fn dimension(&self) -> usize {
-        self.parameters.len()
+        self.parameters.len() + self.errors.count()
     }
 
     fn values(&self, points: &Matrix) -> Result<Vec<f64>, Stop> {
-        let rows = points.iter_rows().map(|u| self.natural(u));
-        self.evaluation.values(&self.event, &Matrix::from_rows(self.dimension(), rows))
+        let own = self.parameters.len();
+        let natural = Matrix::from_rows(own, points.iter_rows().map(|u| self.natural(u)));
+        let errors = (&self.errors, &columns_after(own, points));
+        self.evaluation.values(&self.event, &natural, errors)
     }
 }
 
+/// Columns of the points from this one on.
+fn columns_after(first: usize, points: &Matrix) -> Matrix {
+    Matrix::from_rows(points.columns() - first, points.iter_rows().map(|row| &row[first..]))
+}
+
 /// Limit state of a posterior: an affine map with the mean and the covariance of the draws, and a weight that makes it exact.
+/// The variables of the errors follow, which are independent of it.
 pub struct OfPosterior<'a> {
     evaluation: &'a Evaluation<'a>,
     event: Event,
@@ -141,6 +184,7 @@ pub struct OfPosterior<'a> {
     centre: Vec<f64>,
     factor: Cholesky,
     draws: Matrix,
+    errors: ErrorVariables<'a>,
 }
 
 /// Smallest and largest number of draws of the first level.
@@ -153,6 +197,7 @@ impl<'a> OfPosterior<'a> {
         event: Event,
         posterior: &'a Posterior<'a>,
         calibrated: &Calibrated,
+        (errors, stream): (ErrorVariables<'a>, &Stream),
     ) -> Result<Self, Stop> {
         let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
         let judged = &calibrated.outcome.diagnosis.coordinates;
@@ -170,17 +215,25 @@ impl<'a> OfPosterior<'a> {
             Stop::new("the draws of the posterior have no covariance of full rank")
                 .help("draw more samples")
         })?;
-        let mut draws = points;
-        for i in 0..draws.rows() {
-            let row = draws.row_mut(i);
-            row.iter_mut().zip(&centre).for_each(|(x, m)| *x -= m);
-            factor.whiten(row);
-        }
-        Ok(Self { evaluation, event, posterior, centre, factor, draws })
+        let mut rng = stream.named("errors").generator();
+        let white = |row: &[f64]| {
+            let mut row: Vec<f64> = row.iter().zip(&centre).map(|(x, m)| x - m).collect();
+            factor.whiten(&mut row);
+            row.extend((0..errors.count()).map(|_| normal(&mut rng)));
+            row
+        };
+        let dimension = centre.len() + errors.count();
+        let draws = Matrix::from_rows(dimension, points.iter_rows().map(white));
+        Ok(Self { evaluation, event, posterior, centre, factor, draws, errors })
     }
 
     fn coordinates(&self, point: &[f64]) -> Vec<f64> {
-        self.factor.colour(point).iter().zip(&self.centre).map(|(x, m)| x + m).collect()
+        self.factor
+            .colour(&point[..self.centre.len()])
+            .iter()
+            .zip(&self.centre)
+            .map(|(x, m)| x + m)
+            .collect()
     }
 
     /// Unknowns at a point of the variables, in natural units.
@@ -191,12 +244,14 @@ impl<'a> OfPosterior<'a> {
 
 impl LimitState for OfPosterior<'_> {
     fn dimension(&self) -> usize {
-        self.centre.len()
+        self.centre.len() + self.errors.count()
     }
 
     fn values(&self, points: &Matrix) -> Result<Vec<f64>, Stop> {
-        let rows = points.iter_rows().map(|u| self.natural(u));
-        self.evaluation.values(&self.event, &Matrix::from_rows(self.dimension(), rows))
+        let own = self.centre.len();
+        let natural = Matrix::from_rows(own, points.iter_rows().map(|u| self.natural(u)));
+        let errors = (&self.errors, &columns_after(own, points));
+        self.evaluation.values(&self.event, &natural, errors)
     }
 
     fn is_standard_normal(&self) -> bool {
@@ -205,8 +260,10 @@ impl LimitState for OfPosterior<'_> {
 
     fn log_weights(&self, points: &Matrix) -> Vec<f64> {
         let rows = points.iter_rows().map(|u| self.coordinates(u));
-        let density = self.posterior.log_density(&Matrix::from_rows(self.dimension(), rows));
-        density.iter().zip(points.iter_rows()).map(|(p, u)| p + 0.5 * dot(u, u)).collect()
+        let own = self.centre.len();
+        let density = self.posterior.log_density(&Matrix::from_rows(own, rows));
+        let square = |u: &[f64]| dot(&u[..own], &u[..own]);
+        density.iter().zip(points.iter_rows()).map(|(p, u)| p + 0.5 * square(u)).collect()
     }
 
     fn draws(&self) -> Option<&Matrix> {

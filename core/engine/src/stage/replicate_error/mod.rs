@@ -36,6 +36,7 @@ const FEWEST: usize = 3;
 /// offset.
 pub fn needs_best_fit(study: &Study, measured: &Measured) -> bool {
     let included = study.discrepancy.as_ref().is_some_and(|d| d.common.replicate_error);
+    let included = included && !study.is_stochastic();
     let has_curves = |data: &Measurements| {
         let replicates = data.replicates.iter().filter(|r| r.values.iter().any(Option::is_some));
         let enough = data.covariance.is_none() && replicates.count() >= FEWEST;

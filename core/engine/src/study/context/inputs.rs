@@ -1,13 +1,15 @@
 //! Consistency of the values that a study sets with the inputs of its model, in one scenario.
 
+use std::collections::BTreeSet;
+
 use lacuna::data::{Parameter, Unit};
 use lacuna::plugin::model::{Input, Signature};
 use lacuna::text::Complaints;
 use lacuna::text::nearest::nearest;
 use lacuna::text::problem::Problem;
 
-use crate::study::Study;
 use crate::study::inputs::used_in_expressions;
+use crate::study::{Study, field};
 
 /// Reports values without an input, inputs without a value, units that do not convert, and values outside the model's
 /// range.
@@ -22,8 +24,10 @@ pub(super) fn check(
     let section = study.model.as_ref().map(|model| &model.common);
     let computed = |name: &str| section.is_some_and(|keys| keys.computed.contains_key(name));
     let mut set: Vec<&str> = Vec::new();
+    let mut set_by_fields = BTreeSet::new();
+    field::check(study, signature, &mut set_by_fields, complaints);
     for (parameter, unknown) in study.parameters.iter().zip(&study.unknowns) {
-        if !unknown.acts_in(scenario) {
+        if !unknown.acts_in(scenario) || unknown.of_field() {
             continue;
         }
         let path = format!("parameter.{}", unknown.name);
@@ -61,7 +65,14 @@ pub(super) fn check(
             None => no_input(name, &path, signature, complaints),
         }
     }
-    let missing = |input: &&Input| input.default.is_none() && !set.contains(&input.name.as_str());
+    if let Some(seed) = section.and_then(|keys| keys.seed.as_ref()) {
+        match find(seed.as_str()) {
+            Some(input) => known_fits(1.0, None, input, "model.seed", &mut set, complaints),
+            None => no_input(seed.as_str(), "model.seed", signature, complaints),
+        }
+    }
+    let is_set = |name: &String| set.contains(&name.as_str()) || set_by_fields.contains(name);
+    let missing = |input: &&Input| input.default.is_none() && !is_set(&input.name);
     for input in signature.inputs.iter().filter(missing) {
         let scenario = &study.scenarios[scenario].name;
         let place =

@@ -1,8 +1,9 @@
 //! `[[constraint]]`: conditions on the parameters.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use lacuna::data::{Constraint, Dependence, Parameter, Unit};
+use lacuna::data::{Constraint, Dependence, Field, Parameter, Unit};
 use lacuna::expression::{Fault, Program, Scope};
 use lacuna::text::{Complaints, Node, Problems};
 
@@ -18,7 +19,7 @@ const NAME: &str = "constraint_holds";
 /// The conditions of all sections; what is wrong is left out and reported.
 pub(super) fn constraints(
     sections: &[ConstraintSection],
-    of: (&[Parameter], &[Unknown]),
+    of: (&[Parameter], &[Unknown], &[Arc<Field>]),
     root: &Node,
     problems: &mut Problems,
 ) -> Vec<Constraint> {
@@ -45,10 +46,13 @@ pub(super) fn constraints(
 /// The condition as a program that gives 1 where it holds, and the parameters behind its unknowns.
 fn compiled(
     formula: &str,
-    (parameters, unknowns): (&[Parameter], &[Unknown]),
+    (parameters, unknowns, fields): (&[Parameter], &[Unknown], &[Arc<Field>]),
 ) -> Result<(Program, Vec<usize>), Vec<Fault>> {
     let mut scope = Scope::new();
     let (mut units, mut places) = (BTreeMap::<String, Unit>::new(), Vec::new());
+    for field in fields {
+        scope.field(field.clone()).map_err(|fault| vec![fault])?;
+    }
     for (j, unknown) in unknowns.iter().enumerate().filter(|(_, u)| u.is_shared()) {
         scope.unknown(&unknown.name).map_err(|fault| vec![fault])?;
         units.insert(unknown.name.clone(), parameters[j].unit.clone());

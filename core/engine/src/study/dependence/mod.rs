@@ -11,8 +11,9 @@ mod represent;
 mod run;
 
 use std::path::Path;
+use std::sync::Arc;
 
-use lacuna::data::{Dependence, JointPrior, Parameter, Population};
+use lacuna::data::{Dependence, Field, JointPrior, Parameter, Population};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::text::decode::decode;
@@ -104,15 +105,19 @@ fn tables<T: DeserializeOwned>(root: &Node, list: &str, problems: &mut Problems)
 pub(super) fn dependence(
     sections: &Sections,
     populations: Vec<Population>,
-    (parameters, unknowns): (&[Parameter], &[Unknown]),
+    (parameters, unknowns, fields): (&[Parameter], &[Unknown], &[Arc<Field>]),
     seed: u64,
     root: &Node,
     problems: &mut Problems,
 ) -> Option<Dependence> {
     let before = problems.len();
     let groups = groups::groups(sections, parameters, root, problems);
-    let constraints =
-        constraints::constraints(&sections.constraint, (parameters, unknowns), root, problems);
+    let constraints = constraints::constraints(
+        &sections.constraint,
+        (parameters, unknowns, fields),
+        root,
+        problems,
+    );
     if problems.len() > before {
         return None;
     }

@@ -9,7 +9,7 @@ use lacuna::text::{Complaints, Node, Problems};
 
 use super::{Member, PopulationKeys};
 use crate::study::file::{ParameterSection, Prior};
-use crate::study::unknowns::Unknown;
+use crate::study::unknowns::{Unknown, UnknownKind};
 
 /// Number of draws from which the distribution of a member by itself is described.
 const DRAWS: usize = 20_000;
@@ -44,8 +44,9 @@ pub(in crate::study) fn members(
             name: name.to_owned(),
             scenario: None,
             member: Some(member),
-            of_population: false,
+            kind: UnknownKind::Parameter,
             interval: matches!(section.prior, Some(Prior::Interval { .. })),
+            cut: section.cut,
         });
     }
     let population = section.population.as_ref()?;
@@ -66,8 +67,9 @@ pub(in crate::study) fn members(
             name: format!("{name}.{key}"),
             scenario: None,
             member: None,
-            of_population: true,
+            kind: UnknownKind::Population,
             interval: false,
+            cut: false,
         });
     }
     let typical = population.unknowns()[1].1.quantile(0.5);

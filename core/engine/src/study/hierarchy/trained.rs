@@ -77,7 +77,7 @@ fn inputs(study: &Study) -> (Vec<Parameter>, Vec<Unknown>) {
     let (mut parameters, mut unknowns): (Vec<Parameter>, Vec<Unknown>) = Default::default();
     for (parameter, unknown) in study.parameters.iter().zip(&study.unknowns) {
         let known = unknowns.iter().any(|other| other.name == unknown.name);
-        if known || unknown.of_population {
+        if known || unknown.of_population() {
             continue;
         }
         let mut own = parameter.clone();

@@ -112,6 +112,18 @@ enum Sources {
     Numbers(Vec<Source>),
 }
 
+/// True for each of the values asked for that one of them needs: itself, and those from which it is computed.
+pub fn needed(asked: &[Asked], value: usize) -> Vec<bool> {
+    let mut needed = vec![false; asked.len()];
+    needed[value] = true;
+    for i in (0..=value).rev() {
+        if needed[i] {
+            asked[i].earlier().into_iter().for_each(|before| needed[before] = true);
+        }
+    }
+    needed
+}
+
 /// Source of one number.
 #[derive(Debug, Clone, Copy)]
 enum Source {
@@ -125,6 +137,26 @@ impl Asked {
     /// Returns true if the prediction contains an error of this origin.
     pub fn includes(&self, origin: &str) -> bool {
         self.include.contains(&Included::of(origin))
+    }
+
+    /// Indices of the outputs of the response that the value is computed from; empty for one of numbers.
+    pub fn outputs(&self) -> &[usize] {
+        match &self.arguments {
+            Sources::Outputs(outputs) => outputs,
+            Sources::Numbers(_) => &[],
+        }
+    }
+
+    /// Indices of the values asked for before this one that it is computed from.
+    fn earlier(&self) -> Vec<usize> {
+        let index = |source: &Source| match *source {
+            Source::Asked(i) => Some(i),
+            _ => None,
+        };
+        match &self.arguments {
+            Sources::Outputs(_) => Vec::new(),
+            Sources::Numbers(sources) => sources.iter().filter_map(index).collect(),
+        }
     }
 
     /// Value in `unit`: from the response with its errors, at one output after the other, or from a point of the study's

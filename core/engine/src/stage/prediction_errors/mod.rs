@@ -1,4 +1,8 @@
-//! Draws of the errors of a new replicate, correlated over all outputs.
+//! Errors of a prediction: draws for a new replicate, correlated over all outputs, and those of emulator and numerics as
+//! functions of standard normal variables.
+
+mod given;
+mod variables;
 
 use std::ops::Range;
 
@@ -8,7 +12,8 @@ use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, ErrorPath};
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
-use super::given::GivenData;
+use self::given::GivenData;
+pub use self::variables::ErrorVariables;
 use crate::stage::calibrate::{Law, Parts};
 use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::read::Measured;
@@ -16,7 +21,7 @@ use crate::stage::{emulator_error, predict};
 use crate::study::Study;
 
 /// Errors of a new replicate.
-pub(super) enum Errors {
+pub enum Errors {
     /// Errors of emulator and numerics without data, or none.
     Prior(Vec<CommonError>),
     /// Those of a discrepancy that samples a part of the common errors, and the common errors from their prior: their
@@ -28,7 +33,7 @@ pub(super) enum Errors {
 
 /// Errors given the data. The common errors are drawn for all blocks of scenarios together, because a discrepancy may not
 /// know their correlation; then the errors of the discrepancy alone are drawn around the response with the common errors.
-pub(super) struct Given {
+pub struct Given {
     /// Likelihood of the data with the common errors.
     whole: Parts,
     /// Likelihood without the common errors.

@@ -82,10 +82,18 @@ impl GivenData {
     pub fn draw(&self, gradient: &[f64], stream: &Stream) -> Vec<f64> {
         let mut rng = stream.generator();
         let noise: Vec<f64> = (0..self.factor.columns()).map(|_| normal(&mut rng)).collect();
-        if gradient.iter().any(|slope| !slope.is_finite()) {
-            return noise;
-        }
+        let Some(mean) = self.mean(gradient) else { return noise };
         let mut weights = multiply_vector(&self.root, &noise);
+        weights.iter_mut().zip(mean).for_each(|(w, m)| *w += m);
+        weights
+    }
+
+    /// Mean of the weights, given the derivative of the log-likelihood by the response; `None` if it is not finite.
+    pub fn mean(&self, gradient: &[f64]) -> Option<Vec<f64>> {
+        if gradient.iter().any(|slope| !slope.is_finite()) {
+            return None;
+        }
+        let mut weights = vec![0.0; self.factor.columns()];
         for block in &self.blocks {
             let mut mean = vec![0.0; weights.len()];
             for i in block.outputs.clone().filter(|&i| gradient[i] != 0.0) {
@@ -97,7 +105,14 @@ impl GivenData {
             }
             weights.iter_mut().zip(mean).for_each(|(w, m)| *w += m);
         }
-        weights
+        Some(weights)
+    }
+
+    /// Factor of the errors of some weights about their mean, `outputs x variables`, with independent standard normal
+    /// variables.
+    pub fn spread(&self, columns: Range<usize>) -> Matrix {
+        let columns: Vec<usize> = columns.collect();
+        multiply(&self.factor.select_columns(&columns), &self.root.select_rows(&columns))
     }
 
     /// Values of the errors of some weights: `columns` of the factor.
