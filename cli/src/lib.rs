@@ -26,7 +26,7 @@ use lacuna_plugins as _;
 /// trains the surrogate on simulation runs, infers the model's parameters with their uncertainty,
 /// validates, and writes a report.
 #[derive(Parser)]
-#[command(version, max_term_width = 100)]
+#[command(name = "lacuna", version, max_term_width = 100)]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,

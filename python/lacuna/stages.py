@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _engine
-from .__main__ import name_command
+from .command import name_command
 from .progress import Listener, listener
 from .results import Run
 

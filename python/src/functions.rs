@@ -160,7 +160,7 @@ impl Functions {
         sent.map_err(|_| lost())?;
         let answer =
             py.detach(move || inbox.recv()).map_err(|_| lost())?.map_err(RunError::new_err)?;
-        answer.map(|table| array(py, table)).transpose()
+        Ok(answer.map(|table| bytes(py, &table)))
     }
 }
 

@@ -90,7 +90,9 @@ impl Function for Emulated<'_> {
     fn deviations(&self, points: &Matrix) -> Option<Matrix> {
         let outputs = self.emulator.outputs();
         Some(match self.emulator.variance(points) {
-            Some(variance) => Matrix::from_fn(points.rows(), outputs, |i, j| variance[(i, j)].sqrt()),
+            Some(variance) => {
+                Matrix::from_fn(points.rows(), outputs, |i, j| variance[(i, j)].sqrt())
+            }
             None => Matrix::from_fn(points.rows(), outputs, |_, j| self.deviations[j]),
         })
     }
