@@ -7,10 +7,16 @@ use lacuna::text::problem::Complaints;
 
 use crate::models::process;
 
+/// Environment variable with the path of the command, if the running program is another: a Python interpreter.
+const COMMAND: &str = "LACUNA_PROGRAM";
+
 /// Resolves `program`: a path relative to the study's folder, a name in `PATH`, or, if it is not given, the running
 /// program.
 pub fn program(given: Option<&Path>, study: &Path) -> Result<PathBuf, Stop> {
     let Some(given) = given else {
+        if let Some(command) = std::env::var_os(COMMAND) {
+            return Ok(command.into());
+        }
         return std::env::current_exe()
             .map_err(|error| Stop::new(format!("the running program cannot be found: {error}")));
     };

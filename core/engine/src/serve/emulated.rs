@@ -2,9 +2,12 @@
 
 use lacuna::plugin::Emulator;
 use lacuna::plugin::model::EvalError;
+use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
+use lacuna_linalg::vector::dot;
 
 use super::{Derivatives, Function, Part, Variable, parameters, parts};
+use crate::stage::emulator_error;
 use crate::stage::inverse_problem::InverseProblem;
 use crate::study::Study;
 
@@ -15,14 +18,21 @@ pub(super) struct Emulated<'a> {
     /// Interval of each parameter in which it was fitted.
     region: Vec<(f64, f64)>,
     parts: Vec<Part>,
+    /// Standard deviation of the error of each output over the prior.
+    deviations: Vec<f64>,
 }
 
 impl<'a> Emulated<'a> {
     /// The emulator of a finished run, if it has one.
-    pub(super) fn of(study: &'a Study, problem: &InverseProblem<'a>) -> Option<Self> {
+    pub(super) fn of(study: &'a Study, problem: &InverseProblem<'a>) -> Result<Option<Self>, Stop> {
+        let (Some(emulator), Some(fitted)) = (problem.emulator(), problem.fitted()) else {
+            return Ok(None);
+        };
         let whole = || study.parameters.iter().map(|p| p.design.support()).collect();
         let region = problem.region().map_or_else(whole, <[_]>::to_vec);
-        Some(Self { study, emulator: problem.emulator()?, region, parts: parts(study) })
+        let error = emulator_error::over_prior(study, &fitted.value)?;
+        let deviations = error.factor.iter_rows().map(|row| dot(row, row).sqrt()).collect();
+        Ok(Some(Self { study, emulator, region, parts: parts(study), deviations }))
     }
 
     /// Rejects points outside the region of the fit, where the emulator is not valid.
@@ -63,6 +73,27 @@ impl Function for Emulated<'_> {
         Ok(match scenario {
             Some(i) => all[self.parts[i].outputs.clone()].to_vec(),
             None => all,
+        })
+    }
+
+    fn batch(&self, points: &Matrix) -> Result<Matrix, EvalError> {
+        let mut all = self.emulator.mean(points);
+        for (i, point) in points.iter_rows().enumerate() {
+            if self.inside(point).is_err() {
+                all.row_mut(i).fill(f64::NAN);
+            }
+        }
+        Ok(all)
+    }
+
+    /// The variance that the emulator states at each point, otherwise that of its error curves over the prior.
+    fn deviations(&self, points: &Matrix) -> Option<Matrix> {
+        let outputs = self.emulator.outputs();
+        Some(match self.emulator.variance(points) {
+            Some(variance) => {
+                Matrix::from_fn(points.rows(), outputs, |i, j| variance[(i, j)].sqrt())
+            }
+            None => Matrix::from_fn(points.rows(), outputs, |_, j| self.deviations[j]),
         })
     }
 

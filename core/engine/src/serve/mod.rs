@@ -25,6 +25,7 @@ use lacuna::plugin::registry::{NoKeys, Section};
 use lacuna::run::{Observer, Stop};
 use lacuna_linalg::Matrix;
 use lacuna_run::RunDirectory;
+use rayon::prelude::*;
 
 use crate::pipeline;
 use crate::posterior::{Given, Posterior};
@@ -59,6 +60,22 @@ pub trait Function: Sync {
 
     /// Values at a point: all of them, or those of the scenario with this index.
     fn values(&self, point: &[f64], scenario: Option<usize>) -> Result<Vec<f64>, EvalError>;
+
+    /// All values at each point, `points x values`; NaN at a point where the function has no values.
+    fn batch(&self, points: &Matrix) -> Result<Matrix, EvalError> {
+        let row = |point: &[f64]| match self.values(point, None) {
+            Err(EvalError::Rejected(_)) => Ok(vec![f64::NAN; self.outputs()]),
+            answered => answered,
+        };
+        let all: Vec<&[f64]> = points.iter_rows().collect();
+        let rows: Vec<Vec<f64>> = all.into_par_iter().map(row).collect::<Result<_, _>>()?;
+        Ok(Matrix::from_rows(self.outputs(), rows))
+    }
+
+    /// Standard deviation of the error of each value at each point, `points x values`, if it is known.
+    fn deviations(&self, _points: &Matrix) -> Option<Matrix> {
+        None
+    }
 
     /// Derivatives of the function, if they are known exactly.
     fn derivatives(&self) -> Option<&dyn Derivatives> {
@@ -164,7 +181,7 @@ fn of_run<R>(
     problem: &InverseProblem<'_>,
     act: impl FnOnce(&[&dyn Function]) -> R,
 ) -> Result<R, Stop> {
-    let emulator = Emulated::of(study, problem);
+    let emulator = Emulated::of(study, problem)?;
     let mut all: Vec<&dyn Function> = Vec::new();
     if let Some(model) = simulated {
         all.push(model);

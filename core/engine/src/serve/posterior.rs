@@ -58,6 +58,11 @@ impl Function for LogPosterior<'_> {
         Ok(vec![self.value(point)])
     }
 
+    fn batch(&self, points: &Matrix) -> Result<Matrix, EvalError> {
+        let values: Vec<f64> = points.iter_rows().map(|point| self.value(point)).collect();
+        Ok(Matrix::from_vec(points.rows(), 1, values))
+    }
+
     fn derivatives(&self) -> Option<&dyn Derivatives> {
         Some(self)
     }

@@ -50,6 +50,14 @@ impl Function for Watched<'_> {
         self.sound(self.function.values(point, scenario))
     }
 
+    fn batch(&self, points: &Matrix) -> Result<Matrix, EvalError> {
+        self.sound(self.function.batch(points))
+    }
+
+    fn deviations(&self, points: &Matrix) -> Option<Matrix> {
+        self.function.deviations(points)
+    }
+
     fn derivatives(&self) -> Option<&dyn Derivatives> {
         self.function.derivatives().map(|_| self as &dyn Derivatives)
     }

@@ -1,0 +1,8 @@
+"""The ``lacuna`` command, also as ``python -m lacuna``."""
+
+import sys
+
+from .command import main
+
+if __name__ == "__main__":
+    sys.exit(main())
