@@ -167,7 +167,7 @@ fn the_temperature_of_the_rod_is_the_integral_of_flux_over_conductivity() {
 
 /// The data of the rod follow from a conductivity in closed form that no term of the expansion has.
 #[test]
-#[ignore = "takes minutes: cargo test -p lacuna-tests --test all -- --ignored --nocapture fields::the_conductivity"]
+#[ignore = "takes 20 s on two cores: cargo test --workspace --test all -- --ignored --nocapture fields::the_conductivity"]
 fn the_conductivity_of_the_rod_is_recovered() {
     let folder = tempfile::tempdir().unwrap();
     let study = quick::root().join("configs/rod/study.toml");
