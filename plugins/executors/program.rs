@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use lacuna::run::Stop;
 use lacuna::text::problem::Complaints;
 
-use crate::models::process;
+use lacuna_run::process;
 
 /// Environment variable with the path of the command, if the running program is another: a Python interpreter.
 const COMMAND: &str = "LACUNA_PROGRAM";

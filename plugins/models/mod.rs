@@ -8,6 +8,5 @@ pub mod mercury_target;
 pub mod mercury_target_bubbles;
 pub mod mercury_target_equilibrium_gas;
 mod nested;
-pub mod process;
 pub mod python;
 pub mod um_bridge;

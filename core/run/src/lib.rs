@@ -6,6 +6,7 @@ pub mod arrays;
 pub mod directory;
 mod growth;
 pub mod made_by;
+pub mod process;
 mod provenance;
 pub mod stage;
 #[cfg(test)]

@@ -19,7 +19,7 @@ use super::cluster::scheduler::Rules;
 use super::cluster::{self, Frame, Growth, Plan, Retry, Scheduler, States, Submission, Worker};
 use super::command::said;
 use super::program;
-use crate::models::process;
+use lacuna_run::process;
 
 pub use allocation::{Allocation, Manager};
 

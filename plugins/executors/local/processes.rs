@@ -13,7 +13,7 @@ use lacuna_run::work::{Begun, Marker, Order, Outcome, folder};
 
 use super::Local;
 use crate::executors::program::program;
-use crate::models::process::{Process, tail_of_file};
+use lacuna_run::process::{Process, tail_of_file};
 
 /// Runs the jobs of a batch in several processes and reports each as it ends.
 pub fn submit(

@@ -19,7 +19,7 @@ use super::cluster::scheduler::Rules;
 use super::cluster::script::{quoted, word};
 use super::cluster::{self, Frame, Growth, Plan, Retry, Scheduler, States, Submission, Worker};
 use super::{command, program};
-use crate::models::process;
+use lacuna_run::process;
 
 /// Runs the model on a cluster with Slurm, as job arrays.
 ///

@@ -12,7 +12,7 @@ use super::folder::stays_inside;
 use super::run::{NOT_INPUTS, STDERR, STDIN, STDOUT, of_the_study};
 use super::template::{Place, Template};
 use super::{External, Input, Output, given};
-use crate::models::process;
+use lacuna_run::process;
 
 /// Checks the options against the rest of the study.
 pub fn options(model: &External, context: &Context<'_>, complaints: &mut Complaints<'_>) {

@@ -13,7 +13,7 @@ use super::folder::{cannot, copy, link};
 use super::output::Output;
 use super::template::{Filling, Template};
 use super::{External, Input, answer, given};
-use crate::models::process::{self, Process, tail_of_file};
+use lacuna_run::process::{self, Process, tail_of_file};
 
 /// File with the standard output of the command.
 pub const STDOUT: &str = "stdout.txt";

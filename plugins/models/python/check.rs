@@ -8,9 +8,9 @@ use std::process::{Command, Stdio};
 use lacuna::plugin::Context;
 use lacuna::text::nearest::nearest;
 use lacuna::text::problem::Complaints;
+use lacuna_run::process::interpreter;
 use serde::Deserialize;
 
-use super::pool::interpreter;
 use super::{Python, written};
 use crate::models::given;
 

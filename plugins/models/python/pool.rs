@@ -1,6 +1,6 @@
 //! Workers of a model: each handles one call at a time and is kept for the next.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use serde_json::json;
 use super::Python;
 use super::frame::Answer;
 use super::worker::{Silent, Worker};
-use crate::models::process;
+use lacuna_run::process::interpreter;
 
 /// Minimum time limit for loading a file, however short the limit of a call: loading includes the packages that it
 /// imports.
@@ -95,14 +95,6 @@ fn start(model: &Python, study: &Path, limit: Option<Duration>) -> Result<Worker
             }
         })
     })
-}
-
-/// The interpreter that the option means: a path, a name, or the directory of a virtual environment.
-pub fn interpreter(path: &Path, study: &Path) -> Option<PathBuf> {
-    let folder = study.join(path);
-    let inside = if cfg!(windows) { "Scripts/python" } else { "bin/python" };
-    let path = if folder.is_dir() { folder.join(inside) } else { path.to_owned() };
-    process::find(path.to_str()?, study, None)
 }
 
 fn shown(file: &Path) -> String {

@@ -4,7 +4,6 @@ use std::io::{self, BufReader, Read, Write as _};
 use std::path::Path;
 use std::process::{ChildStdin, Command, Stdio};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -14,11 +13,9 @@ use serde_json::{Value, json};
 
 use super::frame::{self, Answer};
 use crate::models::given::{layout_document, scenario_document};
-use crate::models::process::{Process, tail};
+use lacuna_run::process::{Printed, Process, ending};
 
 const SCRIPT: &str = include_str!("worker.py");
-/// Number of bytes at the end of a worker's output that are kept for messages.
-const REMEMBERED: usize = 4096;
 
 /// Data that do not change from call to call.
 #[derive(Debug)]
@@ -147,17 +144,7 @@ impl Worker {
     /// Description of how the worker ended.
     fn death(&mut self) -> String {
         let status = self.process.wait(Some(Duration::from_secs(1)));
-        let how = match status {
-            Ok(Some(status)) => match status.code() {
-                Some(code) => format!("ended with exit code {code}"),
-                None => "was ended by a signal".to_owned(),
-            },
-            _ => "stopped answering".to_owned(),
-        };
-        match self.printed.tail() {
-            said if said.is_empty() => how,
-            said => format!("{how}; it said: {said}"),
-        }
+        ending(status.ok().flatten(), &self.printed)
     }
 }
 
@@ -174,37 +161,4 @@ fn listen(output: impl Read + Send + 'static) -> Receiver<io::Result<Answer>> {
         }
     });
     receiver
-}
-
-/// The end of a worker's output.
-#[derive(Debug)]
-struct Printed {
-    end: Arc<Mutex<Vec<u8>>>,
-    closed: Receiver<()>,
-}
-
-impl Printed {
-    fn of(mut errors: impl Read + Send + 'static) -> Self {
-        let end = Arc::new(Mutex::new(Vec::new()));
-        let (sender, closed) = mpsc::channel::<()>();
-        let kept = Arc::clone(&end);
-        thread::spawn(move || {
-            // The channel closes when this is dropped.
-            let _open = sender;
-            let mut bytes = [0; REMEMBERED];
-            while let Ok(count @ 1..) = errors.read(&mut bytes) {
-                let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
-                kept.extend_from_slice(&bytes[..count]);
-                let surplus = kept.len().saturating_sub(REMEMBERED);
-                kept.drain(..surplus);
-            }
-        });
-        Self { end, closed }
-    }
-
-    /// The last lines, once the output is complete or one second has passed.
-    fn tail(&self) -> String {
-        let _ = self.closed.recv_timeout(Duration::from_secs(1));
-        tail(&self.end.lock().unwrap_or_else(PoisonError::into_inner))
-    }
 }

@@ -11,7 +11,7 @@ use lacuna_run::work::Begun;
 use super::{Campaign, Hand};
 use crate::executors::cluster::ledger::{self, Settled, Submission};
 use crate::executors::cluster::{Cause, States, TaskState, script};
-use crate::models::process::tail_of_file;
+use lacuna_run::process::tail_of_file;
 
 /// Number of consecutive queries that a scheduler may leave unanswered.
 const SILENCE: usize = 100;

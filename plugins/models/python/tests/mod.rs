@@ -14,7 +14,7 @@ use lacuna::plugin::model::{Call, EvalError, Response};
 use lacuna::plugin::registry::from_text;
 use lacuna_linalg::Matrix;
 
-use crate::models::process;
+use lacuna_run::process;
 
 /// The interpreter; `None` if there is none and none is required.
 fn interpreter() -> Option<PathBuf> {

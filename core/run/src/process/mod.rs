@@ -1,9 +1,10 @@
-//! Simulator processes: each is started as a process group with all its descendants, and the group is ended as a
+//! Processes of simulators and plugins: each is started as a process group with all its descendants, and the group is ended as a
 //! whole.
 //!
 //! A descendant that starts a session of its own leaves the group and is not ended with it.
 
 mod guard;
+mod printed;
 mod program;
 mod tail;
 
@@ -11,7 +12,8 @@ use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 use std::{io, thread};
 
-pub use program::find;
+pub use printed::{Printed, ending};
+pub use program::{find, interpreter};
 pub use tail::{tail, tail_of_file};
 
 /// The time a process that was asked to end (SIGTERM) leaves to this program, to be asked as well.

@@ -17,6 +17,15 @@ pub fn find(program: &str, directory: &Path, path: Option<&OsStr>) -> Option<Pat
         .find(|file| can_run(file))
 }
 
+/// The Python interpreter that a path means: a path relative to `directory`, a name that is searched for, or the directory
+/// of a virtual environment. Returns `None` if there is no such executable file.
+pub fn interpreter(path: &Path, directory: &Path) -> Option<PathBuf> {
+    let folder = directory.join(path);
+    let inside = if cfg!(windows) { "Scripts/python" } else { "bin/python" };
+    let path = if folder.is_dir() { folder.join(inside) } else { path.to_owned() };
+    find(path.to_str()?, directory, None)
+}
+
 #[cfg(unix)]
 fn can_run(file: &Path) -> bool {
     use std::os::unix::fs::PermissionsExt as _;
