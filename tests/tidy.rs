@@ -16,14 +16,25 @@ const UNFINISHED: [&str; 5] = ["TODO", "FIXME", "XXX", "todo!(", "unimplemented!
 const MACHINE: [&str; 6] = ["/home/", "/Users/", "/root/", "/work/", "/tmp/", "C:\\"];
 
 /// Crates of this project that each crate may depend on.
-const ARROWS: [(&str, &[&str]); 12] = [
+const ARROWS: [(&str, &[&str]); 13] = [
     ("core/base", &[]),
     ("core/linalg", &["lacuna-base"]),
     ("core/optimise", &["lacuna-base", "lacuna-linalg"]),
     ("core/api", &["lacuna-base"]),
     ("core/abi", &["lacuna"]),
     ("core/run", &["lacuna"]),
-    ("core/engine", &["lacuna", "lacuna-abi", "lacuna-linalg", "lacuna-optimise", "lacuna-run"]),
+    ("core/script", &["lacuna", "lacuna-abi", "lacuna-run"]),
+    (
+        "core/engine",
+        &[
+            "lacuna",
+            "lacuna-abi",
+            "lacuna-linalg",
+            "lacuna-optimise",
+            "lacuna-run",
+            "lacuna-script",
+        ],
+    ),
     ("core/contract", &["lacuna", "lacuna-linalg", "lacuna-run"]),
     ("sdk", &["lacuna", "lacuna-abi", "lacuna-linalg"]),
     ("um_bridge", &[]),

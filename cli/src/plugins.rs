@@ -14,7 +14,7 @@ use crate::{misuse, print};
 /// Libraries of plugins named on the command line.
 #[derive(clap::Args)]
 pub struct Libraries {
-    /// Load a library of plugins in addition to those of the study; this executes its code; may be repeated
+    /// Load a library of plugins, or a Python file, in addition to those of the study; this executes its code; may be repeated
     #[arg(long = "plugin", value_name = "PATH")]
     pub files: Vec<PathBuf>,
 }
@@ -116,8 +116,14 @@ fn manual(listing: &Listing, markdown: bool) {
 
 /// Origin of a plugin that is not built in.
 fn origin(library: &Library) -> String {
-    let Library { path, sha256, name, version, abi: (major, minor), .. } = library;
-    format!("from {} ({name} {version}, abi {major}.{minor}, sha256 {sha256})", path.display())
+    let Library { path, sha256, name, version, abi, .. } = library;
+    let path = path.display();
+    match abi {
+        Some((major, minor)) => {
+            format!("from {path} ({name} {version}, abi {major}.{minor}, sha256 {sha256})")
+        }
+        None => format!("from {path} (Python, sha256 {sha256})"),
+    }
 }
 
 /// Loads the libraries named on the command line.
@@ -138,11 +144,11 @@ pub fn would_load(seen: &Seen) -> String {
     match &seen.record {
         None => format!("would load {path}: it says nothing of itself; sha256 {sha256}"),
         Some(record) => {
-            let (major, minor) = record.abi;
             let plugins: Vec<String> =
                 record.plugins.iter().map(|(kind, name)| format!("{kind} `{name}`")).collect();
+            let of = record.abi.map_or("Python".to_owned(), |(a, b)| format!("abi {a}.{b}"));
             format!(
-                "would load {path}: {}, abi {major}.{minor}, sha256 {sha256}; options are checked when it is loaded",
+                "would load {path}: {}, {of}, sha256 {sha256}; options are checked when it is loaded",
                 plugins.join(", ")
             )
         }

@@ -21,6 +21,7 @@ pub mod header;
 pub mod linear;
 pub mod memo;
 pub mod object;
+pub mod options;
 pub mod record;
 pub mod refusal;
 pub mod reply;

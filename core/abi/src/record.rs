@@ -9,8 +9,8 @@
 /// The plugins of a library, as the text in its file lists them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Record {
-    /// The version of the boundary for which it was made.
-    pub abi: (u32, u32),
+    /// The version of the boundary for which it was made; `None` for a Python file.
+    pub abi: Option<(u32, u32)>,
     /// Kind and name of each plugin.
     pub plugins: Vec<(String, String)>,
 }
@@ -30,7 +30,7 @@ pub fn find(bytes: &[u8]) -> Option<Record> {
 
 fn read(mut rest: &[u8]) -> Option<Record> {
     let (major, minor) = line(&mut rest)?.split_once('.')?;
-    let abi = (major.parse().ok()?, minor.parse().ok()?);
+    let abi = Some((major.parse().ok()?, minor.parse().ok()?));
     let mut plugins = Vec::new();
     loop {
         let line = line(&mut rest)?;
@@ -73,7 +73,7 @@ mod tests {
             .extend(b"\0lacuna-plugin-record:1.2\ndiscrepancy=matern\nsampler=walk_2\nend\n\0more");
         let plugins = [("discrepancy", "matern"), ("sampler", "walk_2")]
             .map(|(k, n)| (k.to_owned(), n.to_owned()));
-        assert_eq!(find(&bytes), Some(Record { abi: (1, 2), plugins: plugins.to_vec() }));
+        assert_eq!(find(&bytes), Some(Record { abi: Some((1, 2)), plugins: plugins.to_vec() }));
         assert_eq!(find(b"lacuna-plugin-record:1.2\nno plugin\nend\n"), None);
         assert_eq!(find(b"lacuna-plugin-record:1.2\nsampler=walk\n"), None);
     }

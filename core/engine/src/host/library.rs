@@ -1,4 +1,5 @@
-//! Loads libraries of plugins: explicitly, once, and for as long as the process lives.
+//! Loads libraries of plugins: explicitly, once, and for as long as the process lives. Files of plugins in Python are
+//! loaded by the crate that serves them.
 
 use std::ffi::c_void;
 use std::path::{Path, PathBuf};
@@ -24,8 +25,11 @@ const MOST: u32 = 4096;
 /// Loads a library, or finds that it is loaded. The error says what is wrong with it.
 ///
 /// The file is `path`, never one that is searched for. With `pin` the file must have that SHA-256. Its code runs
-/// from here on, and the library stays in the process.
+/// from here on, and the library stays in the process. A file with the extension `py` is one of plugins in Python.
 pub fn load(path: &Path, pin: Option<&str>) -> Result<&'static Library, String> {
+    if is_python(path) {
+        return load_python(path, pin, None, Path::new("."));
+    }
     let bytes = std::fs::read(path).map_err(|error| files::in_words(&error))?;
     let sha256 = files::hash(&bytes);
     pinned(&sha256, pin)?;
@@ -44,6 +48,23 @@ pub fn load(path: &Path, pin: Option<&str>) -> Result<&'static Library, String> 
     let library = bring(path, sha256)?;
     all.push(library);
     Ok(library)
+}
+
+/// True for a file of plugins in Python.
+pub fn is_python(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "py")
+}
+
+/// Loads a file of plugins in Python, as [`load`] does. `interpreter` is a path relative to `directory`, a program or a
+/// virtual environment.
+pub fn load_python(
+    path: &Path,
+    pin: Option<&str>,
+    interpreter: Option<&Path>,
+    directory: &Path,
+) -> Result<&'static Library, String> {
+    let library = lacuna_script::load(path, interpreter, directory)?;
+    pinned(&library.sha256, pin).map(|()| library)
 }
 
 /// True for a file that has the hash that it must have.
@@ -71,11 +92,12 @@ fn bring(path: PathBuf, sha256: String) -> Result<&'static Library, String> {
         // SAFETY: as above.
         .map(|entry| unsafe { (entry.kind.string(), entry.name.string()) })
         .collect();
-    let abi = (declaration.major, declaration.minor);
+    let abi = Some((declaration.major, declaration.minor));
     let library: &'static Library =
         Box::leak(Box::new(Library { path, sha256, name, version, sdk, abi, plugins }));
     // SAFETY: the entries are constants of a library that stays.
-    loaded::add(unsafe { offers(entries, library)? });
+    let offered = unsafe { offers(entries, library)? };
+    loaded::add(&library.path.display().to_string(), offered);
     Ok(library)
 }
 

@@ -14,7 +14,6 @@ mod effect;
 pub mod library;
 mod model;
 mod offer;
-mod options;
 mod plugin;
 mod quantity;
 mod reader;

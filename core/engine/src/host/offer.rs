@@ -9,6 +9,7 @@ use lacuna::plugin::{
 };
 use lacuna::run::Fault;
 use lacuna::text::{Complaints, Node, Problems};
+use lacuna_abi::options::Options;
 use lacuna_abi::record::is_word;
 use lacuna_abi::table::{
     ComponentFunctions, DesignFunctions, DiscrepancyFunctions, EffectFunctions, Entry as Raw,
@@ -21,7 +22,6 @@ use schemars::{Schema, SchemaGenerator};
 use serde_json::{Map, Value as Json};
 
 use super::Plugin;
-use super::options::Options;
 
 /// Checks all plugins of a library and makes entries of them; none when one of them is wrong.
 ///

@@ -55,7 +55,6 @@ pub fn end(study: &Study, run: &RunDirectory) -> Result<(), Stop> {
 
 /// A library of plugins, as recorded in the manifest.
 fn described(library: &Library) -> Value {
-    let (major, minor) = library.abi;
     let plugins: Vec<String> =
         library.plugins.iter().map(|(kind, name)| format!("{kind}.{name}")).collect();
     json!({
@@ -64,7 +63,7 @@ fn described(library: &Library) -> Value {
         "name": library.name,
         "version": library.version,
         "sdk": library.sdk,
-        "abi": format!("{major}.{minor}"),
+        "abi": library.abi.map(|(major, minor)| format!("{major}.{minor}")),
         "plugins": plugins,
     })
 }

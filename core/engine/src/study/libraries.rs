@@ -1,4 +1,4 @@
-//! `[plugins]`: libraries of plugins that a study loads.
+//! `[plugins]`: libraries and Python files of plugins that a study loads.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use lacuna::plugin::Library;
 use lacuna::plugin::registry::loaded::AnyEntry;
 use lacuna::run::files;
 use lacuna::text::decode::decode;
-use lacuna::text::{Complaints, Node, Problems};
+use lacuna::text::{Complaints, Node, Problems, Value};
 use lacuna_abi::record::{self, Record};
 use schemars::JsonSchema;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use crate::host::{declared, library};
 
-/// Plugin libraries from third parties. Their code runs with all rights of the program: load only libraries you trust.
+/// Plugins from third parties, in libraries or in Python files. Their code runs with all rights of the program: load only libraries you trust.
 /// `lacuna check STUDY` lists the libraries without loading them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -23,6 +23,64 @@ pub struct PluginsSection {
     /// Library files, relative to the study: `["./libmatern.so"]`, or with the hash that the file must have,
     /// `[{ path = "./libmatern.so", sha256 = "…" }]`. No search path is used.
     pub load: Vec<LibraryFile>,
+    /// Python files of plugins, relative to the study: `"mine.py"`, or several in an array; with the hash that a file must have
+    /// as in `load`. NumPy has to be installed.
+    #[serde(skip_serializing_if = "Files::is_empty")]
+    pub python: Files,
+    /// Python interpreter of these files: a path relative to the study with a `/`, the directory of a virtual environment, or
+    /// a name that is searched for in `PATH`. Default: that of the environment variable `LACUNA_PYTHON`, or `python3`; in
+    /// the Python package, the running one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interpreter: Option<PathBuf>,
+}
+
+/// One file or several.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Files(pub Vec<LibraryFile>);
+
+impl Files {
+    /// True for none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl<'de> Deserialize<'de> for Files {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OneOrSeveral;
+        impl<'de> Visitor<'de> for OneOrSeveral {
+            type Value = Files;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a path, `{ path = \"…\", sha256 = \"…\" }`, or an array of these")
+            }
+            fn visit_str<E: de::Error>(self, path: &str) -> Result<Files, E> {
+                Ok(Files(vec![LibraryFile { path: path.into(), sha256: None }]))
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Files, A::Error> {
+                let table = Table::deserialize(de::value::MapAccessDeserializer::new(map))?;
+                Ok(Files(vec![LibraryFile { path: table.path, sha256: Some(table.sha256) }]))
+            }
+            fn visit_seq<A: de::SeqAccess<'de>>(self, seq: A) -> Result<Files, A::Error> {
+                let files = Vec::deserialize(de::value::SeqAccessDeserializer::new(seq))?;
+                Ok(Files(files))
+            }
+        }
+        deserializer.deserialize_any(OneOrSeveral)
+    }
+}
+
+impl JsonSchema for Files {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Files".into()
+    }
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let (one, several) = (
+            generator.subschema_for::<LibraryFile>(),
+            generator.subschema_for::<Vec<LibraryFile>>(),
+        );
+        schemars::json_schema!({ "anyOf": [one, several] })
+    }
 }
 
 /// The file of a library.
@@ -137,14 +195,20 @@ pub(super) fn libraries(
         let section: PluginsSection = decode(node, problems)?;
         let before = problems.len();
         let mut libraries = Libraries::default();
-        for (i, file) in section.load.iter().enumerate() {
-            let brought = bring(file, directory, purpose, &mut libraries);
-            if let Err(reason) = brought {
-                let message = format!(
-                    "the library of plugins {} cannot be used: {reason}",
-                    file.path.display()
-                );
-                Complaints::new(node, problems).at(&format!("load.{i}")).say(message);
+        let several = node.get("python").is_some_and(|node| matches!(node.value, Value::Array(_)));
+        let load = section.load.iter().enumerate().map(|(i, file)| (file, format!("load.{i}")));
+        let python = section.python.0.iter().enumerate().map(|(i, file)| {
+            (file, if several { format!("python.{i}") } else { "python".to_owned() })
+        });
+        for (file, key) in load.chain(python) {
+            let in_python = key.starts_with("python") || library::is_python(&file.path);
+            let interpreter = section.interpreter.as_deref();
+            let as_python = in_python.then_some(interpreter);
+            if let Err(reason) = bring(file, as_python, directory, purpose, &mut libraries) {
+                let what = if in_python { "file of plugins" } else { "library of plugins" };
+                let message =
+                    format!("the {what} {} cannot be used: {reason}", file.path.display());
+                Complaints::new(node, problems).at(&key).say(message);
             }
         }
         libraries.section = section;
@@ -152,8 +216,11 @@ pub(super) fn libraries(
     })
 }
 
+/// Looks at a file and, unless the study is only checked, loads it; `python` says that it is one of plugins in Python, and
+/// names its interpreter.
 fn bring(
     file: &LibraryFile,
+    python: Option<Option<&Path>>,
     directory: &Path,
     purpose: Use,
     libraries: &mut Libraries,
@@ -162,10 +229,18 @@ fn bring(
     let bytes = std::fs::read(&path).map_err(|error| files::in_words(&error))?;
     let sha256 = files::hash(&bytes);
     library::pinned(&sha256, file.sha256.as_deref())?;
-    let record = record::find(&bytes);
+    let record = match python {
+        Some(_) => Some(lacuna_script::record(&String::from_utf8_lossy(&bytes))),
+        None => record::find(&bytes),
+    };
     libraries.seen.push(Seen { path: file.path.clone(), sha256, record });
-    if purpose != Use::Check {
-        libraries.loaded.push(library::load(&path, file.sha256.as_deref())?);
+    if purpose == Use::Check {
+        return Ok(());
     }
+    let pin = file.sha256.as_deref();
+    libraries.loaded.push(match python {
+        Some(interpreter) => library::load_python(&path, pin, interpreter, directory)?,
+        None => library::load(&path, pin)?,
+    });
     Ok(())
 }

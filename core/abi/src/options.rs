@@ -1,4 +1,4 @@
-//! The options of a plugin of a library, as its schema describes them.
+//! The options of a plugin that is not linked, as its schema describes them.
 
 use lacuna::text::nearest::{nearest, one_of};
 use lacuna::text::{Node, Problem, Problems};
@@ -8,8 +8,8 @@ use serde_json::{Map, Value as Json};
 /// The prefix of references to definitions where a schema stands by itself.
 const DEFINITIONS: &str = "#/$defs/";
 
-/// The schema of a plugin's options.
-pub(super) struct Options {
+/// The options of a plugin: the keys that its schema has.
+pub struct Options {
     /// Without its definitions.
     schema: Map<String, Json>,
     definitions: Map<String, Json>,

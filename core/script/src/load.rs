@@ -1,0 +1,110 @@
+//! Loads files of plugins.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use lacuna::plugin::Library;
+use lacuna::plugin::registry::loaded;
+use lacuna::run::files;
+use lacuna_abi::record::is_word;
+use lacuna_run::process::interpreter;
+use serde::Deserialize;
+use serde_json::{Map, Value as Json};
+
+use crate::offer::offer;
+use crate::script::Script;
+use crate::worker::Worker;
+
+/// Interpreter of files whose study names none; the Python package sets it to its own.
+const VARIABLE: &str = "LACUNA_PYTHON";
+
+/// Files that were loaded, each with the interpreter that serves it.
+static LOADED: Mutex<Vec<(PathBuf, &'static Library)>> = Mutex::new(Vec::new());
+
+/// A plugin as its file declares it.
+#[derive(Deserialize)]
+pub(crate) struct Declared {
+    /// Kind of the plugin.
+    pub kind: String,
+    /// Name in studies.
+    pub name: String,
+    /// JSON Schema of its options.
+    pub schema: Map<String, Json>,
+    /// Optional methods that it has.
+    pub has: Vec<String>,
+}
+
+/// Loads a file, or finds that it is loaded as it is now: its code runs from here on. One that has changed replaces what was
+/// loaded before. The interpreter is a path relative to `directory`, a program or a virtual environment; without one it
+/// is that of the environment variable `LACUNA_PYTHON`, or `python3`.
+///
+/// # Errors
+/// What is wrong with the file, in words.
+pub fn load(
+    file: &Path,
+    named: Option<&Path>,
+    directory: &Path,
+) -> Result<&'static Library, String> {
+    let bytes = std::fs::read(file).map_err(|error| files::in_words(&error))?;
+    let sha256 = files::hash(&bytes);
+    let file = file.canonicalize().map_err(|error| files::in_words(&error))?;
+    let python = python(named, directory)?;
+    // One at a time, so that no two files give plugins of the same name.
+    let mut all = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = all
+        .iter()
+        .find(|(by, library)| library.path == file && library.sha256 == sha256 && *by == python);
+    if let Some((_, library)) = known {
+        return Ok(library);
+    }
+    let library = bring(&file, sha256, &python)?;
+    all.retain(|(_, other)| other.path != file);
+    all.push((python, library));
+    Ok(library)
+}
+
+fn python(named: Option<&Path>, directory: &Path) -> Result<PathBuf, String> {
+    let variable = std::env::var_os(VARIABLE).map(PathBuf::from);
+    let given = named.map(Path::to_owned).or(variable).unwrap_or_else(|| "python3".into());
+    interpreter(&given, directory)
+        .ok_or_else(|| format!("there is no Python interpreter `{}`", given.display()))
+}
+
+fn bring(file: &Path, sha256: String, python: &Path) -> Result<&'static Library, String> {
+    let (worker, said) = Worker::start(python, file)?;
+    if let Some(error) = said.head.get("error").and_then(Json::as_str) {
+        return Err(error.to_owned());
+    }
+    let declared = said.head.get("plugins").cloned().unwrap_or_default();
+    let declared: Vec<Declared> = serde_json::from_value(declared)
+        .map_err(|error| format!("its plugins cannot be read: {error}"))?;
+    if declared.is_empty() {
+        return Err(
+            "it declares no plugin: expected classes with decorators such as `@lacuna.sampler`"
+                .to_owned(),
+        );
+    }
+    if let Some(odd) = declared.iter().find(|plugin| !is_word(&plugin.name)) {
+        return Err(format!("`{}` is no name for a plugin", odd.name));
+    }
+    let path = file.to_owned();
+    let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let plugins = declared.iter().map(|p| (p.kind.clone(), p.name.clone())).collect();
+    let version = env!("CARGO_PKG_VERSION").to_owned();
+    let (sdk, abi) = (String::new(), None);
+    let library: &'static Library =
+        Box::leak(Box::new(Library { path, sha256, name, version, sdk, abi, plugins }));
+    let script = Arc::new(Script::new(file.to_owned(), python.to_owned(), worker));
+    let origin = library.path.display().to_string();
+    let before = loaded::remove(&origin);
+    let offered: Result<Vec<_>, String> =
+        declared.into_iter().map(|plugin| offer(plugin, &script, library)).collect();
+    match offered {
+        Ok(entries) => loaded::add(&origin, entries),
+        Err(error) => {
+            loaded::add(&origin, before);
+            return Err(error);
+        }
+    }
+    Ok(library)
+}

@@ -1,0 +1,287 @@
+//! Plugins in Python: the suites of the kinds, a study that uses all of them, and files that are wrong.
+//!
+//! `LACUNA_PYTHON` names an interpreter that has NumPy; without it the tests report that they are skipped, unless
+//! `LACUNA_REQUIRE_PYTHON=1` makes that a failure.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use lacuna::data::{Axis, Layout, Measurements, Replicate, Unit};
+use lacuna::math::random::{Stream, normal};
+use lacuna::plugin::discrepancy::Known;
+use lacuna::plugin::reader::MeasurementSource;
+use lacuna::plugin::registry::{self, Kind};
+use lacuna::plugin::{Discrepancy, Effect, Library, Model, Quantity, Reader, Sampler, Surrogate};
+use lacuna_engine::host::library;
+use lacuna_linalg::Matrix;
+
+use crate::contracts::{model, sound};
+use crate::quick;
+
+/// True if there is an interpreter.
+fn has_python() -> bool {
+    let required = std::env::var_os("LACUNA_REQUIRE_PYTHON").is_some_and(|value| value == "1");
+    let named = std::env::var_os("LACUNA_PYTHON").is_some();
+    assert!(named || !required, "LACUNA_PYTHON names no interpreter");
+    if !named {
+        println!("skipped: LACUNA_PYTHON names no interpreter with numpy");
+    }
+    named
+}
+
+fn example() -> PathBuf {
+    quick::root().join("examples/plugin_python")
+}
+
+fn plugins() -> &'static Library {
+    static LOADED: OnceLock<&'static Library> = OnceLock::new();
+    LOADED.get_or_init(|| {
+        library::load(&example().join("plugins.py"), None).unwrap_or_else(|e| panic!("{e}"))
+    })
+}
+
+/// Runs a plugin of the example through a suite.
+fn judged<K: Kind + ?Sized>(
+    name: &str,
+    options: &str,
+    suite: impl Fn(&str, &K) -> Result<(), Vec<String>>,
+) {
+    if !has_python() {
+        return;
+    }
+    plugins();
+    let built = registry::from_text::<K>(name, options).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(built.library, Some(plugins()));
+    let breaches = suite(name, &*built.plugin).err().unwrap_or_default();
+    assert!(breaches.is_empty(), "{}", breaches.join("\n"));
+}
+
+#[test]
+fn a_quantity_keeps_its_contract() {
+    judged::<dyn Quantity>("overshoot", "level = 0.3", |name, plugin| {
+        sound(plugin, lacuna_contract::quantity(name, plugin))
+    });
+}
+
+#[test]
+fn an_effect_keeps_its_contract() {
+    judged::<dyn Effect>("warming", "", |name, plugin| {
+        sound(plugin, lacuna_contract::effect(name, plugin))
+    });
+}
+
+#[test]
+fn a_discrepancy_keeps_its_contract() {
+    judged::<dyn Discrepancy>("heavy_tails", "scale = 0.2", |name, plugin| {
+        sound(plugin, lacuna_contract::discrepancy(name, plugin))
+    });
+}
+
+#[test]
+fn a_sampler_keeps_its_contract() {
+    judged::<dyn Sampler>("jump_walk", "", |name, plugin| {
+        sound(plugin, lacuna_contract::sampler(name, plugin))
+    });
+}
+
+#[test]
+fn a_surrogate_keeps_its_contract() {
+    judged::<dyn Surrogate>("cubic", "", |name, plugin| {
+        sound(plugin, lacuna_contract::surrogate(name, plugin))
+    });
+}
+
+#[test]
+fn a_model_keeps_its_contract() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rise.py");
+    let text = "import lacuna\n@lacuna.model\nclass Rise:\n    def predict(self, inputs, layout):\n        \
+                return inputs['a'][:, None] + inputs['b'][:, None] ** 2 * layout.grid\n    \
+                def gradient(self, inputs, layout):\n        \
+                return {'a': 1 + 0 * layout.grid, 'b': 2 * inputs['b'] * layout.grid}\n";
+    std::fs::write(&file, text).unwrap();
+    library::load(&file, None).unwrap_or_else(|e| panic!("{e}"));
+    let built = registry::from_text::<dyn Model>("rise", "").unwrap_or_else(|e| panic!("{e}"));
+    let breaches = sound(&*built.plugin, model("rise", &*built.plugin)).err().unwrap_or_default();
+    assert!(breaches.is_empty(), "{}", breaches.join("\n"));
+}
+
+#[test]
+fn a_reader_reads_what_the_text_says() {
+    judged::<dyn Reader>("columns", "path = \"table.csv\"", |_, plugin| {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("table.csv"), "1,2\n3,\n5.5,-6e-3\n").unwrap();
+        let axes = vec![Axis::grid("time", vec![1.0, 2.0, 3.0], Unit::parse("s").unwrap())];
+        let layout = Layout { name: "y".to_owned(), unit: Unit::dimensionless(), axes };
+        let source =
+            MeasurementSource { directory: folder.path(), scenario: None, layout: &layout };
+        let data = plugin.measurements(&source).unwrap_or_else(|error| panic!("{error}"));
+        let values: Vec<_> = data.replicates.iter().map(|r| r.values.clone()).collect();
+        assert_eq!(values, [[Some(1.0), Some(3.0), Some(5.5)], [Some(2.0), None, Some(-6e-3)]]);
+        assert_eq!(plugin.files(Path::new("a"), None), [Path::new("a").join("table.csv")]);
+        std::fs::write(folder.path().join("table.csv"), "1,2\n3,x\n").unwrap();
+        let error = plugin.measurements(&source).err().unwrap().to_string();
+        assert!(
+            error.contains("could not convert string to float") && error.contains("line"),
+            "{error}"
+        );
+        sound(plugin, Ok(()))
+    });
+}
+
+/// The likelihood of Student's t errors against the closed form, computed here.
+#[test]
+fn the_likelihood_of_heavy_tails_is_that_of_the_formula() {
+    judged::<dyn Discrepancy>("heavy_tails", "degrees = 5.0", |_, plugin| {
+        let axes = vec![Axis::grid("time", vec![1.0, 2.0], Unit::parse("s").unwrap())];
+        let layout = Layout { name: "y".to_owned(), unit: Unit::dimensionless(), axes };
+        let values = [[0.5, 1.0], [0.2, 3.0]];
+        let replicate = |row: [f64; 2]| Replicate::new("r", row.map(Some).to_vec());
+        let data = Measurements::new(layout, values.map(replicate).to_vec());
+        let made = plugin.likelihood(&Known::without_slopes(&data, &[])).unwrap();
+        let density = |response: [f64; 2], scale: f64| -> f64 {
+            let one = |y: f64, m: f64| {
+                -scale.ln() - 3.0 * (1.0 + (y - m).powi(2) / (5.0 * scale * scale)).ln()
+            };
+            values.iter().map(|row| one(row[0], response[0]) + one(row[1], response[1])).sum()
+        };
+        for (response, scale) in [([0.0, 0.0], 0.3), ([0.4, 2.0], 1.7)] {
+            let found = made.log_likelihood(&response, &[scale]);
+            assert!((found - density(response, scale)).abs() < 1e-12 * found.abs(), "{found}");
+        }
+        sound(plugin, Ok(()))
+    });
+}
+
+/// A study of which every part that can be a plugin in Python is one gives the same bits on one thread and on three, and
+/// again after the workers have ended; the truths are those with which its data were made.
+#[test]
+fn a_study_of_python_parts_finds_the_truth_with_the_same_bits() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let run = |name: &str, threads: usize| {
+        let out = folder.path().join(name);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let study = example().join("study.toml");
+        pool.install(|| quick::run(&study, &["sampler.steps=400"], &out))
+            .unwrap_or_else(|stop| panic!("{stop}"));
+        quick::summary(&out)
+    };
+    let (one, three) = (run("one", 1), run("three", 3));
+    assert_eq!(one["parameters"], three["parameters"]);
+    assert_eq!(one["quantities"], three["quantities"]);
+    for (name, truth) in [("amplitude", 2.0), ("rate", 0.7)] {
+        let [mean, sd] = ["mean", "sd"].map(|key| one["parameters"][name][key].as_f64().unwrap());
+        assert!((mean - truth).abs() < 4.0 * sd, "{name}: {mean} ± {sd}");
+        assert!(sd < 0.02 * truth, "{name}: {sd}");
+    }
+}
+
+/// What a wrong file or a wrong answer is told as: with the name of the plugin, the file and the line.
+#[test]
+fn what_is_wrong_is_told_with_its_place() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let load = |text: &str| {
+        let file = folder.path().join("wrong.py");
+        std::fs::write(&file, text).unwrap();
+        library::load(&file, None).err().unwrap_or_default()
+    };
+    assert_eq!(load("x = 1\ndef f(:\n"), "invalid syntax, in line 2");
+    assert_eq!(
+        load("import lacuna\nlacuna.nothing\n").split(", in").last(),
+        Some(" line 2: `lacuna.nothing`")
+    );
+    let none = load("import lacuna\n");
+    assert!(none.starts_with("it declares no plugin"), "{none}");
+    let method = load("import lacuna\n@lacuna.sampler\nclass A:\n    pass\n");
+    assert_eq!(method, "the class `A` has no method `step`");
+    let ends = load("import os\nos._exit(3)\n");
+    assert!(ends.ends_with("ended with exit code 3"), "{ends}");
+    let taken = load("import lacuna\n@lacuna.quantity('at')\nclass A:\n    def value(self): pass\n");
+    assert!(taken.contains("quantity `at` has a name that is taken"), "{taken}");
+}
+
+/// A file that has changed is loaded anew: the plugins are those of the new text.
+#[test]
+fn a_changed_file_replaces_its_plugins() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("changing.py");
+    let value = |text: &str| {
+        let class = "import lacuna\n@lacuna.quantity\nclass Changing:\n    def value(self, curve):\n        return";
+        std::fs::write(&file, format!("{class} {text}\n")).unwrap();
+        library::load(&file, None).unwrap_or_else(|e| panic!("{e}"));
+        let built = registry::from_text::<dyn Quantity>("changing", "").unwrap();
+        let curve = lacuna::plugin::quantity::Curve {
+            name: "y",
+            unit: &Unit::dimensionless(),
+            axis: "t",
+            grid: &[0.0, 1.0],
+            grid_unit: &Unit::dimensionless(),
+        };
+        let bound = built.plugin.bind(&lacuna::plugin::quantity::Arguments::Curve(curve));
+        bound.ok().unwrap().value(&[3.0, 4.0])
+    };
+    assert_eq!([value("curve.max()"), value("curve.min()")], [4.0, 3.0]);
+}
+
+/// Time of a likelihood of 120 walkers, 20 replicates and 1000 outputs through a worker, beside that of NumPy alone.
+///
+/// `cargo test --test dynamic -- --ignored --nocapture time_of_a_call`
+#[test]
+#[ignore = "a measurement for the guide"]
+fn time_of_a_call() {
+    if !has_python() {
+        return;
+    }
+    plugins();
+    let built = registry::from_text::<dyn Discrepancy>("heavy_tails", "").unwrap();
+    for (replicates, outputs) in [(20, 1000), (20, 100), (4, 21)] {
+        let axes =
+            vec![Axis::grid("t", (0..outputs).map(|i| i as f64).collect(), Unit::dimensionless())];
+        let layout = Layout { name: "y".to_owned(), unit: Unit::dimensionless(), axes };
+        let mut rng = Stream::root(1).generator();
+        let mut row = || (0..outputs).map(|_| Some(normal(&mut rng))).collect();
+        let all = (0..replicates).map(|r| Replicate::new(r.to_string(), row())).collect();
+        let data = Measurements::new(layout, all);
+        let made = built.plugin.likelihood(&Known::without_slopes(&data, &[])).unwrap();
+        let (responses, hyper) = (Matrix::zeros(120, outputs), Matrix::from_fn(120, 1, |_, _| 1.0));
+        let rounds = 20;
+        made.log_likelihoods(&responses, &hyper);
+        let begun = std::time::Instant::now();
+        (0..rounds).for_each(|_| _ = made.log_likelihoods(&responses, &hyper));
+        let whole = begun.elapsed().as_secs_f64() / f64::from(rounds);
+        let script = format!(
+            "import sys, time\nsys.path.insert(0, {root:?})\nsys.path.insert(0, {example:?})\n\
+             import types, numpy as np\nlacuna = types.ModuleType('lacuna')\n\
+             exec(open({plugin:?}).read(), lacuna.__dict__)\nsys.modules['lacuna'] = lacuna\n\
+             import plugins\np = lacuna.build(plugins.HeavyTails, {{}})\n\
+             class D: pass\nd = D()\nd.values = np.random.default_rng(1).standard_normal(({replicates}, {outputs}))\n\
+             d.count = np.full({outputs}, {replicates})\nr = np.zeros((120, {outputs}))\nu = {{'scale': np.ones(120)}}\n\
+             z = np.zeros({outputs})\np.log_likelihood(r, u, d, z)\nt = time.perf_counter()\n\
+             for _ in range({rounds}): p.log_likelihood(r, u, d, z)\nprint((time.perf_counter() - t) / {rounds})\n",
+            root = quick::root().join("python"),
+            example = example(),
+            plugin = quick::root().join("python/lacuna/plugin.py"),
+        );
+        let python = std::env::var_os("LACUNA_PYTHON").unwrap();
+        let output = std::process::Command::new(python).args(["-c", &script]).output().unwrap();
+        let alone: f64 = String::from_utf8_lossy(&output.stdout).trim().parse().unwrap();
+        let more = 100.0 * (whole / alone - 1.0);
+        println!(
+            "{replicates} x {outputs}: {:.2} ms, NumPy alone {:.2} ms, {more:.1} % more",
+            1e3 * whole,
+            1e3 * alone
+        );
+    }
+}
