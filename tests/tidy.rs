@@ -39,7 +39,17 @@ const ARROWS: [(&str, &[&str]); 13] = [
     ("sdk", &["lacuna", "lacuna-abi", "lacuna-linalg"]),
     ("um_bridge", &[]),
     ("plugins", &["lacuna", "lacuna-linalg", "lacuna-optimise", "lacuna-run", "lacuna-um-bridge"]),
-    ("cli", &["lacuna", "lacuna-engine", "lacuna-plugins", "lacuna-run", "lacuna-um-bridge"]),
+    (
+        "cli",
+        &[
+            "lacuna",
+            "lacuna-contract",
+            "lacuna-engine",
+            "lacuna-plugins",
+            "lacuna-run",
+            "lacuna-um-bridge",
+        ],
+    ),
 ];
 
 struct Source {

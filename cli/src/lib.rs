@@ -135,7 +135,10 @@ enum Verb {
         json: bool,
     },
     /// List the plugins that a study can name, with their options, defaults and references
+    #[command(args_conflicts_with_subcommands = true)]
     Plugins {
+        #[command(subcommand)]
+        deed: Option<plugins::Deed>,
         /// A kind, such as `surrogate`, or one plugin, such as `surrogate.polynomial_chaos`
         name: Option<String>,
         /// Print Markdown
@@ -228,7 +231,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Resume { run, trust } => study::resume(&run, trust),
         Verb::Report { run, trust } => study::report(&run, trust),
         Verb::Compare { runs, json } => study::compare(&runs, json),
-        Verb::Plugins { name, markdown, libraries } => {
+        Verb::Plugins { deed: Some(deed), .. } => plugins::act(&deed),
+        Verb::Plugins { deed: None, name, markdown, libraries } => {
             plugins::list(name.as_deref(), markdown, &libraries)
         }
         Verb::Schema { of, libraries } => plugins::schema(of, &libraries),

@@ -1,5 +1,6 @@
 //! Command `new`: skeletons of studies and plugins.
 
+mod language;
 mod library;
 mod plugin;
 mod skeleton;
@@ -9,6 +10,8 @@ mod tests;
 mod tree;
 
 use std::path::PathBuf;
+
+use language::Language;
 
 /// Type of skeleton.
 #[derive(clap::Subcommand)]
@@ -24,6 +27,9 @@ pub enum What {
         kind: String,
         /// Name by which a study chooses the plugin, such as `random_walk`
         name: String,
+        /// Language of the plugin; a file in another one than Rust is written into the current folder
+        #[arg(long, value_enum, default_value = "rust")]
+        language: language::Language,
         /// Create a library in this folder, outside Lacuna's source; a study loads it with `[plugins]`
         #[arg(long, value_name = "FOLDER")]
         library: Option<PathBuf>,
@@ -38,7 +44,14 @@ pub enum What {
 pub fn write(what: &What) -> anyhow::Result<()> {
     match what {
         What::Study { name } => study::write(name),
-        What::Plugin { kind, name, library, source } => {
+        What::Plugin { kind, name, language, library, .. } if *language != Language::Rust => {
+            if library.is_some() {
+                let help = "leave out `--library`";
+                return Err(plugin::wrong("a library folder holds a plugin in Rust", help));
+            }
+            language::write(kind, name, *language)
+        }
+        What::Plugin { kind, name, library, source, .. } => {
             plugin::write(kind, name, library.as_deref(), source.as_deref())
         }
     }

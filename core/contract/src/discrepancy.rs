@@ -14,7 +14,8 @@ use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
 use self::draws::{
-    draws_errors_given_the_data, draws_the_errors_it_predicts, simulates_what_it_predicts,
+    draws_errors_given_the_data, draws_the_errors_it_predicts, has_the_law_that_it_simulates,
+    simulates_what_it_predicts,
 };
 use crate::judge::{Check, agree, calm, judge, layout, refused, slope, twice};
 
@@ -30,6 +31,8 @@ use crate::judge::{Check, agree, calm, judge, layout, refused, slope, twice};
 /// - Reduced to a linear emulator it is the same function, with the same derivatives.
 /// - Simulated data have the missing values of the measurements, and the variance predicted for a new replicate, within
 ///   five Monte Carlo errors.
+/// - The likelihood is that of the data which are simulated, unless its law follows from the data: the identities of Bartlett
+///   hold within five Monte Carlo errors.
 /// - The errors of a new replicate are those of its predicted variance: one path for each origin, with that variance within
 ///   five Monte Carlo errors, and the same from the same stream.
 /// - The errors given the data, if that form is implemented, are finite, one path for each origin, and the same from the
@@ -49,7 +52,7 @@ pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<
     };
     // An error of the data's mean concerns existing data, not a new replicate.
     let (of_data, of_model) = (|| common("replicates", false), || common("numerics", true));
-    let checks: [Check<'_>; 10] = [
+    let checks: [Check<'_>; 11] = [
         ("has sound hyperparameters", Box::new(over(has_sound_hyperparameters, of_data()))),
         ("judges responses", Box::new(over(judges_responses, of_data()))),
         ("knows its derivatives", Box::new(over(knows_its_derivatives, of_data()))),
@@ -57,6 +60,7 @@ pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<
         ("stands for parts", Box::new(|| stands_for_parts(discrepancy))),
         ("compresses exactly", Box::new(over(compresses_exactly, of_data()))),
         ("simulates what it predicts", Box::new(over(simulates_what_it_predicts, of_model()))),
+        ("has the law that it simulates", Box::new(|| has_the_law_that_it_simulates(discrepancy))),
         ("draws the errors it predicts", Box::new(over(draws_the_errors_it_predicts, of_model()))),
         ("draws errors given the data", Box::new(over(draws_errors_given_the_data, of_model()))),
         ("refuses bad data", Box::new(|| refuses_bad_data(discrepancy))),

@@ -2,9 +2,10 @@
 
 use lacuna::data::{Measurements, Replicate};
 use lacuna::math::random::Stream;
-use lacuna::plugin::discrepancy::{ErrorPath, Likelihood, VariancePart};
+use lacuna::plugin::Discrepancy;
+use lacuna::plugin::discrepancy::{ErrorPath, Likelihood, StochasticModel, VariancePart};
 
-use super::{OUTPUTS, data, start, truth};
+use super::{OUTPUTS, common, data, known, start, truth};
 
 pub(super) fn simulates_what_it_predicts(likelihood: &dyn Likelihood) -> Result<(), String> {
     const COUNT: u64 = 2000;
@@ -47,6 +48,70 @@ pub(super) fn simulates_what_it_predicts(likelihood: &dyn Likelihood) -> Result<
     }
     Ok(())
 }
+
+/// Tests that the likelihood is that of the data which are simulated, by the identities of Bartlett (Biometrika 40 (1953) 12):
+/// at the truth the derivative of the log-likelihood by a shift or a stretch of the response has mean zero, and a variance
+/// that is minus the mean of the second derivative. A discrepancy whose law follows from the data has none of them and is
+/// left out, as is one whose likelihood is an estimate.
+pub(super) fn has_the_law_that_it_simulates(discrepancy: &dyn Discrepancy) -> Result<(), String> {
+    const COUNT: u64 = 300;
+    if discrepancy.stochastic_model() != StochasticModel::Refused {
+        return Ok(());
+    }
+    let (truth, errors) = (truth(), [common("emulator", true)]);
+    let build = |data: &Measurements| {
+        let built = discrepancy.likelihood(&known(data, &errors));
+        built.map_err(|stop| format!("sound data are refused: {stop}"))
+    };
+    let whole = build(&data())?;
+    let start = start(&*whole);
+    let law = |likelihood: &dyn Likelihood| -> Vec<Vec<f64>> {
+        likelihood.predictive(&truth, &start).into_iter().map(|part| part.variance).collect()
+    };
+    let fixed = law(&*whole);
+    let (mut scores, mut curvatures) = (Vec::new(), Vec::new());
+    for k in 0..COUNT {
+        let made = whole.simulate(&truth, &start, &Stream::root(14).at(k));
+        let [made] = &made[..] else { return Ok(()) };
+        let of_made = build(made)?;
+        if of_made.hyperparameters().len() != start.len() || law(&*of_made) != fixed {
+            return Ok(());
+        }
+        // Along the response itself, of which every output takes part.
+        let along = |stretch: f64| {
+            let response: Vec<f64> = truth.iter().map(|y| stretch * y).collect();
+            of_made.log_likelihood(&response, &start)
+        };
+        let (below, here, above) = (along(1.0 - STRETCH), along(1.0), along(1.0 + STRETCH));
+        scores.push((above - below) / (2.0 * STRETCH));
+        curvatures.push((above - 2.0 * here + below) / (STRETCH * STRETCH));
+    }
+    let of = |values: &[f64]| {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let spread = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        (mean, (spread / n).sqrt())
+    };
+    let (mean, error) = of(&scores);
+    if mean.abs() > 5.0 * error {
+        return Err(format!(
+            "its likelihood is not that of the data it simulates: along the response its slope has the mean {mean} ± {error} in place \
+             of 0"
+        ));
+    }
+    let differences: Vec<f64> = scores.iter().zip(&curvatures).map(|(s, c)| s * s + c).collect();
+    let (mean, error) = of(&differences);
+    if mean.abs() > 5.0 * error {
+        let share = 1.0 + mean / -of(&curvatures).0;
+        return Err(format!(
+            "its likelihood is not that of the data it simulates: their variance is about {share:.2} times that of the likelihood"
+        ));
+    }
+    Ok(())
+}
+
+/// Step of the differences along the response, as a part of it.
+const STRETCH: f64 = 1e-3;
 
 pub(super) fn draws_the_errors_it_predicts(likelihood: &dyn Likelihood) -> Result<(), String> {
     const COUNT: u64 = 2000;
