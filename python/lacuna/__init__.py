@@ -10,6 +10,7 @@ Plugins in Python are classes with the decorators `model`, `quantity`, `effect`,
 """
 
 from ._engine import RunError, StudyError, __version__
+from .command import name_interpreter
 from .plugin import (
     Complaint,
     Rejected,
@@ -26,6 +27,8 @@ from .plugin import (
 )
 from .results import Emulator, Posterior, Run, load
 from .stages import check, gap, run
+
+name_interpreter()
 
 __all__ = [
     "Complaint",

@@ -19,6 +19,11 @@ def main() -> int:
     return _engine.command(["lacuna", *sys.argv[1:]])
 
 
+def name_interpreter() -> None:
+    """Name the running interpreter for files of plugins, unless the environment names another one."""
+    os.environ.setdefault("LACUNA_PYTHON", sys.executable)
+
+
 def name_command() -> None:
     """Name the command for the processes that make simulation runs; the running program is an interpreter."""
     if "LACUNA_PROGRAM" in os.environ:

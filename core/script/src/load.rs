@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lacuna::plugin::Library;
-use lacuna::plugin::registry::loaded;
+use lacuna::plugin::registry::loaded::{self, AnyEntry};
 use lacuna::run::files;
 use lacuna_abi::record::is_word;
 use lacuna_run::process::interpreter;
@@ -18,8 +18,27 @@ use crate::worker::Worker;
 /// Interpreter of files whose study names none; the Python package sets it to its own.
 const VARIABLE: &str = "LACUNA_PYTHON";
 
-/// Files that were loaded, each with the interpreter that serves it.
-static LOADED: Mutex<Vec<(PathBuf, &'static Library)>> = Mutex::new(Vec::new());
+/// Files that were loaded.
+static LOADED: Mutex<Vec<Loaded>> = Mutex::new(Vec::new());
+
+/// A loaded file, with the interpreter that serves it.
+#[derive(Clone)]
+struct Loaded {
+    python: PathBuf,
+    library: &'static Library,
+    entries: Vec<AnyEntry>,
+}
+
+impl Loaded {
+    fn origin(&self) -> String {
+        self.library.path.display().to_string()
+    }
+
+    /// True for a file with a plugin of the same kind and name.
+    fn rivals(&self, other: &Self) -> bool {
+        other.library.plugins.iter().any(|plugin| self.library.plugins.contains(plugin))
+    }
+}
 
 /// A plugin as its file declares it.
 #[derive(Deserialize)]
@@ -34,9 +53,10 @@ pub(crate) struct Declared {
     pub has: Vec<String>,
 }
 
-/// Loads a file, or finds that it is loaded as it is now: its code runs from here on. One that has changed replaces what was
-/// loaded before. The interpreter is a path relative to `directory`, a program or a virtual environment; without one it
-/// is that of the environment variable `LACUNA_PYTHON`, or `python3`.
+/// Loads a file, or finds that it is loaded as it is now: its code runs from here on. It takes the place of what it was before
+/// it changed, and of files that were loaded before and have plugins of the same names: those of the study that is read last
+/// are meant. The interpreter is a path relative to `directory`, a program or a virtual environment; without one it is
+/// that of the environment variable `LACUNA_PYTHON`, or `python3`.
 ///
 /// # Errors
 /// What is wrong with the file, in words.
@@ -51,15 +71,20 @@ pub fn load(
     let python = python(named, directory)?;
     // One at a time, so that no two files give plugins of the same name.
     let mut all = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
-    let known = all
-        .iter()
-        .find(|(by, library)| library.path == file && library.sha256 == sha256 && *by == python);
-    if let Some((_, library)) = known {
-        return Ok(library);
+    let known = all.iter().find(|known| {
+        known.library.path == file && known.library.sha256 == sha256 && known.python == python
+    });
+    let next = match known {
+        Some(known) => known.clone(),
+        None => bring(&file, sha256, &python, &all)?,
+    };
+    for other in all.iter().filter(|other| other.library.path == file || other.rivals(&next)) {
+        loaded::remove(&other.origin());
     }
-    let library = bring(&file, sha256, &python)?;
-    all.retain(|(_, other)| other.path != file);
-    all.push((python, library));
+    loaded::add(&next.origin(), next.entries.clone());
+    all.retain(|other| other.library.path != file);
+    let library = next.library;
+    all.push(next);
     Ok(library)
 }
 
@@ -70,7 +95,8 @@ fn python(named: Option<&Path>, directory: &Path) -> Result<PathBuf, String> {
         .ok_or_else(|| format!("there is no Python interpreter `{}`", given.display()))
 }
 
-fn bring(file: &Path, sha256: String, python: &Path) -> Result<&'static Library, String> {
+/// Runs a file and makes entries of its plugins; their names must be free but for those of other files in Python.
+fn bring(file: &Path, sha256: String, python: &Path, others: &[Loaded]) -> Result<Loaded, String> {
     let (worker, said) = Worker::start(python, file)?;
     if let Some(error) = said.head.get("error").and_then(Json::as_str) {
         return Err(error.to_owned());
@@ -95,16 +121,10 @@ fn bring(file: &Path, sha256: String, python: &Path) -> Result<&'static Library,
     let library: &'static Library =
         Box::leak(Box::new(Library { path, sha256, name, version, sdk, abi, plugins }));
     let script = Arc::new(Script::new(file.to_owned(), python.to_owned(), worker));
-    let origin = library.path.display().to_string();
-    let before = loaded::remove(&origin);
+    let removed: Vec<_> =
+        others.iter().map(|other| (other.origin(), loaded::remove(&other.origin()))).collect();
     let offered: Result<Vec<_>, String> =
         declared.into_iter().map(|plugin| offer(plugin, &script, library)).collect();
-    match offered {
-        Ok(entries) => loaded::add(&origin, entries),
-        Err(error) => {
-            loaded::add(&origin, before);
-            return Err(error);
-        }
-    }
-    Ok(library)
+    removed.into_iter().for_each(|(origin, entries)| loaded::add(&origin, entries));
+    Ok(Loaded { python: python.to_owned(), library, entries: offered? })
 }

@@ -211,9 +211,27 @@ pub(super) fn libraries(
                 Complaints::new(node, problems).at(&key).say(message);
             }
         }
+        for (file, plugin) in twice(&libraries.loaded) {
+            let message = format!("{file} has a {plugin} too: a study has one of each name");
+            Complaints::new(node, problems).at("").say(message);
+        }
         libraries.section = section;
         (problems.len() == before).then_some(libraries)
     })
+}
+
+/// Plugins that two of the files have: the later file, kind and name.
+fn twice(loaded: &[&'static Library]) -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    for (i, library) in loaded.iter().enumerate() {
+        let earlier = || loaded[..i].iter().flat_map(|other| &other.plugins);
+        for plugin @ (kind, name) in &library.plugins {
+            if earlier().any(|other| other == plugin) {
+                found.push((library.file(), format!("{kind} `{name}`")));
+            }
+        }
+    }
+    found
 }
 
 /// Looks at a file and, unless the study is only checked, loads it; `python` says that it is one of plugins in Python, and
