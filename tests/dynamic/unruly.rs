@@ -13,6 +13,7 @@ use lacuna_linalg::Matrix;
 use tempfile::TempDir;
 
 use super::hostile::misguided;
+use super::quick;
 
 /// A plugin that misbehaves in one way, and the folder of its library.
 pub fn misbehaving<K: Kind + ?Sized>(name: &str, define: &str) -> (Box<K>, TempDir) {
@@ -56,6 +57,26 @@ fn an_answer_of_a_model_is_checked() {
             let who = format!("model `{name}` of lib{name}.so: ");
             assert!(answer.1.starts_with(&who) && answer.1.contains(expected.1), "{}", answer.1);
         }
+    }
+}
+
+/// A library that ends the program is named, and the program ends with an error.
+#[test]
+fn an_end_of_the_program_names_the_plugin() {
+    for (define, said, code) in [
+        ("EXITS", "error: model `ends` of libends.so ended the program by `exit`", Some(1)),
+        ("ABORTS", "error: model `ends` of libends.so aborted the program", None),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        misguided(folder.path(), "unruly.c", "ends", &[define]);
+        let ended = quick::command()
+            .args(["plugins", "test", "libends.so"])
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&ended.stderr);
+        assert!(text.contains(said), "{text}");
+        assert_eq!(ended.status.code(), code, "{text}");
     }
 }
 

@@ -27,6 +27,7 @@ pub mod refusal;
 pub mod reply;
 pub mod status;
 pub mod table;
+pub mod watch;
 pub mod wire;
 
 pub use memo::Memo;

@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use crate::basic::Answer;
 use crate::check::{UNMARKED, densities_only, marks, numbers_only};
 use crate::shape::{Table, read, whole};
-use crate::{Refusal, Reply, status};
+use crate::{Refusal, Reply, status, watch};
 
 /// An object of the other side, with its functions: the calls are made from the tables.
 pub struct Object<F> {
@@ -86,7 +86,8 @@ impl<F> Object<F> {
         call: impl FnOnce(C, *const Answer) -> i32,
     ) -> Asked {
         let Some(function) = function else { return Asked { what, reply: Ok(None) } };
-        let reply = match Reply::of(what, |answer| call(function, answer)) {
+        let asked = || Reply::of(what, |answer| call(function, answer));
+        let reply = match watch::inside(self.fault.who(), asked) {
             Ok(reply) => Ok(Some(reply)),
             Err(refusal) if refusal.status == status::ABSENT => Ok(None),
             Err(refusal) => Err(refusal),

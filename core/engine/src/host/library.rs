@@ -10,6 +10,7 @@ use lacuna::plugin::registry::loaded;
 use lacuna::run::files;
 use lacuna_abi::status;
 use lacuna_abi::table::{Declaration, Entry, Host, MAGIC, MAJOR, MINOR};
+use lacuna_abi::watch;
 
 use crate::host::offers;
 
@@ -79,6 +80,7 @@ pub fn pinned(sha256: &str, pin: Option<&str>) -> Result<(), String> {
 
 /// Loads, checks and registers a library.
 fn bring(path: PathBuf, sha256: String) -> Result<&'static Library, String> {
+    watch::ready();
     let declaration = declaration(&path)?;
     // SAFETY: the declaration belongs to a library that stays, and says how many entries it has.
     let entries = unsafe { entries(declaration)? };

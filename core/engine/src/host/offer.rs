@@ -17,7 +17,7 @@ use lacuna_abi::table::{
     Table, Text, copied,
 };
 use lacuna_abi::wire::{Complaint, json_of_node, table_of_json};
-use lacuna_abi::{Object, Refusal, Reply, status};
+use lacuna_abi::{Object, Refusal, Reply, status, watch};
 use schemars::{Schema, SchemaGenerator};
 use serde_json::{Map, Value as Json};
 
@@ -203,8 +203,10 @@ impl<K: Kind + ?Sized, F: Table> Offered<K, F> {
         let options = json_of_node(node).to_string();
         let mut this = std::ptr::null_mut();
         let to = &raw mut this;
+        let who = self.who();
         // SAFETY: the function belongs to a library that stays; text and place are there until it returns.
-        Reply::of("create", |answer| unsafe { create(Text::of(&options), to, answer) })?;
+        let call = |answer| unsafe { create(Text::of(&options), to, answer) };
+        watch::inside(&who, || Reply::of("create", call))?;
         if this.is_null() {
             return Err(Refusal::stop("`create` makes nothing"));
         }
