@@ -105,6 +105,8 @@ pub fn folder(study: &Study, out: Option<&Path>) -> PathBuf {
 
 /// Runs `lacuna check STUDY`.
 pub fn check(path: &Path, settings: &Settings) -> anyhow::Result<()> {
+    // What the command line names is trusted: its options are checked too.
+    plugins::load(&settings.libraries)?;
     let checked = resolve::load_for(path, &settings.set(), Use::Check);
     for library in &checked.libraries {
         print(&plugins::would_load(library));
@@ -240,7 +242,7 @@ fn coloured(line: &str, level: Level) -> String {
 fn execute(study: &Study, folder: &Path, look: bool, trust: Trust) -> anyhow::Result<()> {
     let mut run = RunDirectory::open(folder)?;
     if look {
-        run.look();
+        if study.libraries.absent.is_empty() { run.look() } else { run.look_as_recorded() }
     }
     let terminal = Terminal::new();
     let findings = pipeline::run(study, &mut run, &terminal)?;

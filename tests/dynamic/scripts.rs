@@ -340,3 +340,79 @@ fn time_of_a_call() {
         );
     }
 }
+
+/// Copies the example into a folder and shortens its chains; returns the study.
+fn copied(folder: &Path) -> PathBuf {
+    for name in ["plugins.py", "study.toml", "activity.csv"] {
+        std::fs::copy(example().join(name), folder.join(name)).unwrap();
+    }
+    let study = folder.join("study.toml");
+    let text = std::fs::read_to_string(&study).unwrap();
+    std::fs::write(&study, text.replace("steps = 1000", "steps = 200")).unwrap();
+    study
+}
+
+/// Output of a command, which must succeed.
+fn said(arguments: &[&str], folder: &Path) -> String {
+    let output = quick::command().args(arguments).current_dir(folder).output().unwrap();
+    let text = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();
+    assert!(output.status.success(), "{text}");
+    text
+}
+
+/// A finished run is reported and resumed when the file of its model, reader, sampler and quantity is gone: nothing of them
+/// has to be computed. A discrepancy or a surrogate is needed for what the report says of the posterior.
+#[test]
+fn a_finished_run_needs_its_file_no_more() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let study = copied(folder.path());
+    let text = std::fs::read_to_string(&study).unwrap();
+    let text = text.replace("use = \"cubic\"", "use = \"polynomial_chaos\"").replace(
+        "use = \"heavy_tails\"\nscale = 0.1",
+        "use = \"gaussian\"\nvariance = { half_normal = 0.1 }",
+    );
+    std::fs::write(&study, text).unwrap();
+    said(&["run", "study.toml", "--out", "run"], folder.path());
+    let summary = quick::summary(&folder.path().join("run"));
+    std::fs::remove_file(folder.path().join("plugins.py")).unwrap();
+    for verb in ["report", "resume"] {
+        said(&[verb, "run"], folder.path());
+        let again = quick::summary(&folder.path().join("run"));
+        assert_eq!(again["parameters"], summary["parameters"], "{verb}");
+        assert_eq!(again["quantities"], summary["quantities"], "{verb}");
+    }
+}
+
+/// What a changed file would compute from the same draws is computed again, though the draws have the same bits.
+#[test]
+fn what_follows_from_a_changed_file_is_computed_again() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    copied(folder.path());
+    said(&["run", "study.toml", "--out", "run"], folder.path());
+    let record = |stage: &str| -> serde_json::Value {
+        let file = folder.path().join("run").join(stage).join("stage.json");
+        serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
+    };
+    let stages = ["5-calibrate", "6-evidence", "6-validate", "6-quantities"];
+    let before = stages.map(record);
+    let file = folder.path().join("plugins.py");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let other = text
+        .replace("self.degrees / (self.degrees - 2)}", "4 * self.degrees / (self.degrees - 2)}");
+    assert_ne!(text, other);
+    std::fs::write(&file, other).unwrap();
+    said(&["run", "study.toml", "--out", "run"], folder.path());
+    let after = stages.map(record);
+    assert_eq!(before[0]["outputs"], after[0]["outputs"], "the draws are the same");
+    for (stage, (old, new)) in stages.iter().zip(before.iter().zip(&after)) {
+        assert_ne!(old["inputs"], new["inputs"], "{stage} was not computed again");
+    }
+    // The design and the runs do not depend on plugins that come after them but through the file of the model.
+    assert_ne!(before[2]["outputs"], after[2]["outputs"], "the predictive variance has changed");
+}

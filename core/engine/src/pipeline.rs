@@ -128,6 +128,7 @@ pub fn power(
     }
     independent(study)?;
     run.watch(study.faults());
+    run.uses(study.libraries.all().map(|library| library.sha256.clone()));
     let kept = if study.surrogate.is_some() {
         let (emulated, _) = calibrate_emulated(study, run, observer)?;
         power::stage(study, design, simulations, &emulated.problem(), run, observer)?

@@ -85,6 +85,10 @@ pub struct RunDirectory {
     pub(super) remade: bool,
     /// True if results are reused whatever code made them.
     pub(super) looking: bool,
+    /// True if finished results are also reused whatever their inputs were.
+    pub(super) as_recorded: bool,
+    /// Hashes of the files of plugins that the study loads.
+    pub(super) libraries: Vec<String>,
     _lock: File,
 }
 
@@ -132,6 +136,8 @@ impl RunDirectory {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             remade: false,
             looking: false,
+            as_recorded: false,
+            libraries: Vec::new(),
             _lock: lock,
         })
     }
@@ -163,6 +169,18 @@ impl RunDirectory {
         self.looking = true;
     }
 
+    /// Like [`Self::look`], and takes finished results as those of this study: a file of plugins is gone that would have to
+    /// say what they were made from.
+    pub fn look_as_recorded(&mut self) {
+        self.look();
+        self.as_recorded = true;
+    }
+
+    /// Registers the files of plugins that the study loads, by their hashes.
+    pub fn uses(&mut self, libraries: impl IntoIterator<Item = String>) {
+        self.libraries = libraries.into_iter().collect();
+    }
+
     /// Acts as another version of the program, for tests of what that changes.
     #[doc(hidden)]
     pub fn pretend(&mut self, version: &str) {
@@ -188,7 +206,8 @@ impl RunDirectory {
         observer: &dyn Observer,
         make: impl FnOnce(&Path) -> Result<T, Stop>,
     ) -> Result<Kept<T>, Stop> {
-        let Asked { alone, whole: inputs, made_by } = Asked::of(stage, inputs, &self.version)?;
+        let Asked { alone, whole: inputs, made_by } =
+            Asked::of(stage, inputs, &self.version, &self.libraries)?;
         let folder = self.stage_folder(stage);
         let inputs = self.looked_at(stage, &alone).unwrap_or(inputs);
         let before = self.made_otherwise(stage, &alone, &inputs, &made_by);
@@ -253,12 +272,12 @@ impl RunDirectory {
 
     /// Hash of a stage's inputs and of the code that makes its result.
     pub fn hash_of(&self, stage: &Folder, inputs: &impl Serialize) -> Result<String, Stop> {
-        Ok(Asked::of(stage, inputs, &self.version)?.whole)
+        Ok(Asked::of(stage, inputs, &self.version, &self.libraries)?.whole)
     }
 
     /// Returns true if a stage is finished for these inputs.
     pub fn has(&self, stage: &Folder, inputs: &impl Serialize) -> Result<bool, Stop> {
-        let Asked { alone, whole, .. } = Asked::of(stage, inputs, &self.version)?;
+        let Asked { alone, whole, .. } = Asked::of(stage, inputs, &self.version, &self.libraries)?;
         let inputs = self.looked_at(stage, &alone).unwrap_or(whole);
         let folder = self.stage_folder(stage);
         let aside = self.aside(stage, &inputs);

@@ -79,9 +79,19 @@ pub(super) struct Asked {
 }
 
 impl Asked {
-    pub fn of(folder: &Folder, inputs: &impl Serialize, version: &str) -> Result<Self, Stop> {
+    /// `libraries` are the hashes of the files of plugins that the study loads: what any of them computes from the draws is
+    /// computed again if one changes, whatever the stage names among its inputs.
+    pub fn of(
+        folder: &Folder,
+        inputs: &impl Serialize,
+        version: &str,
+        libraries: &[String],
+    ) -> Result<Self, Stop> {
         let wrong = |error| Stop::new(format!("cannot hash the inputs of {folder}: {error}"));
         let mut value = serde_json::to_value(inputs).map_err(wrong)?;
+        if folder.stage() >= Stage::Calibrate && !libraries.is_empty() {
+            value = serde_json::json!([value, libraries]);
+        }
         let mut plugins = BTreeMap::new();
         strip(&mut value, &mut plugins);
         let text = serde_json::to_string(&(folder.name(), &value)).map_err(wrong)?;
@@ -128,7 +138,7 @@ mod tests {
     }
 
     fn asked(stage: Stage, revision: u32, version: &str) -> Asked {
-        Asked::of(&stage.folder(), &(1, plugin(revision)), version).unwrap()
+        Asked::of(&stage.folder(), &(1, plugin(revision)), version, &[]).unwrap()
     }
 
     #[test]

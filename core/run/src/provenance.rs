@@ -11,12 +11,13 @@ use crate::made_by::MadeBy;
 use crate::stage::Folder;
 
 impl RunDirectory {
-    /// Hash under which a stage is stored, if results are reused whatever code made them and this one has these inputs.
+    /// Hash under which a stage is stored, if results are reused whatever code made them and this one has these inputs, or
+    /// inputs that cannot be told any more.
     pub(super) fn looked_at(&self, stage: &Folder, alone: &str) -> Option<String> {
         let folder = self.stage_folder(stage);
         let record: Option<Record> =
             files::read_json(&folder.join(RECORD)).ok().filter(|_| self.looking);
-        let record = record.filter(|record| record.is_of(alone))?;
+        let record = record.filter(|record| self.as_recorded || record.is_of(alone))?;
         // A damaged result is repeated, under the hash of the present code.
         let whole = matches!(finished(&folder, &record.inputs), Finished::Whole(_));
         whole.then_some(record.inputs)

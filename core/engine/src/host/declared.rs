@@ -16,12 +16,11 @@ use lacuna::plugin::registry::{Built, Entry, Kind, find};
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{
-    Component, Context, Design, Discrepancy, Effect, Emulator, Hyperparameter, Likelihood, Model,
-    Quantity, Reader, Sampler, Surrogate, Target,
+    Component, Context, Design, Discrepancy, Effect, Emulator, Hyperparameter, Library, Likelihood,
+    Model, Quantity, Reader, Sampler, Surrogate, Target,
 };
 use lacuna::run::{Progress, Stop};
 use lacuna::text::{Node, Problems};
-use lacuna_abi::record::Record;
 use lacuna_abi::wire::{self, SignatureAbout};
 use lacuna_linalg::Matrix;
 use serde_json::json;
@@ -30,14 +29,21 @@ use toml::Table;
 /// A plugin of a library that was not loaded.
 struct Absent;
 
-/// The plugins that a library is said to hold; those of kinds that this program does not know, and those that are
-/// there already, are left out.
-pub fn entries(path: &Path, record: &Record) -> Vec<AnyEntry> {
-    let plugins = record.plugins.iter();
-    plugins.filter_map(|(kind, name)| of_kind(path, kind, name)).collect()
+/// The plugins that a library is said to hold, by kind and name; those of kinds that this program does not know, and those
+/// that are there already, are left out. A library that made a finished run, and is gone, lends them its identity.
+pub fn entries(
+    path: &Path,
+    plugins: &[(String, String)],
+    library: Option<&'static Library>,
+) -> Vec<AnyEntry> {
+    let plugins = plugins.iter();
+    plugins.filter_map(|(kind, name)| of_kind((path, library), kind, name)).collect()
 }
 
-fn of_kind(path: &Path, kind: &str, name: &str) -> Option<AnyEntry> {
+/// The file of a plugin, and the library that it was.
+type From<'a> = (&'a Path, Option<&'static Library>);
+
+fn of_kind(path: From<'_>, kind: &str, name: &str) -> Option<AnyEntry> {
     match kind {
         "design" => entry::<dyn Design>(path, name, || Box::new(Absent)),
         "discrepancy" => entry::<dyn Discrepancy>(path, name, || Box::new(Absent)),
@@ -51,7 +57,11 @@ fn of_kind(path: &Path, kind: &str, name: &str) -> Option<AnyEntry> {
     }
 }
 
-fn entry<K: Kind + ?Sized>(path: &Path, name: &str, make: fn() -> Box<K>) -> Option<AnyEntry> {
+fn entry<K: Kind + ?Sized>(
+    (path, library): From<'_>,
+    name: &str,
+    make: fn() -> Box<K>,
+) -> Option<AnyEntry> {
     if find::<K>(name).is_ok() {
         return None;
     }
@@ -59,7 +69,7 @@ fn entry<K: Kind + ?Sized>(path: &Path, name: &str, make: fn() -> Box<K>) -> Opt
     let build = move |node: &Node, _: &[&str], _: &mut Problems| {
         let options = wire::json_of_node(node);
         let options = options.as_object().map(wire::table_of_json).unwrap_or_default();
-        Some(Built { name, plugin: make(), options, library: None, revision: 1 })
+        Some(Built { name, plugin: make(), options, library, revision: 1 })
     };
     let entry: &'static Entry<K> = Box::leak(Box::new(Entry {
         name,
@@ -69,7 +79,7 @@ fn entry<K: Kind + ?Sized>(path: &Path, name: &str, make: fn() -> Box<K>) -> Opt
         module_path: Box::leak(path.display().to_string().into_boxed_str()),
         version: "",
         revision: 1,
-        library: None,
+        library,
     }));
     Some(entry)
 }

@@ -22,6 +22,7 @@ pub fn origin(root: &Path) -> Option<PathBuf> {
 /// Writes `study.toml` (byte for byte), `resolved.toml` (which runs as it is) and the path of the study.
 pub fn begin(study: &Study, run: &mut RunDirectory) -> Result<(), Stop> {
     run.watch(study.faults());
+    run.uses(study.libraries.all().map(|library| library.sha256.clone()));
     let file = std::path::absolute(&study.file).unwrap_or_else(|_| study.file.clone());
     // A resumed run is read from its own directory, which must not replace the original path.
     let root = std::path::absolute(run.root()).unwrap_or_else(|_| run.root().to_owned());
@@ -47,10 +48,40 @@ pub fn end(study: &Study, run: &RunDirectory) -> Result<(), Stop> {
         "study_sha256": files::hash(study.text.as_bytes()),
         "lacuna": env!("CARGO_PKG_VERSION"),
         "seed": study.about.seed,
-        "plugins": study.libraries.loaded.iter().map(|library| described(library)).collect::<Vec<_>>(),
+        "plugins": study.libraries.all().map(described).collect::<Vec<_>>(),
         "stages": run.records(),
     });
     files::write_json(&run.root().join("manifest.json"), &manifest)
+}
+
+/// The library of plugins at a path, as the manifest of a run describes it; `None` if it describes none.
+pub fn library(run: &Path, path: &Path) -> Option<&'static Library> {
+    let text = std::fs::read_to_string(run.join("manifest.json")).ok()?;
+    let manifest: Value = serde_json::from_str(&text).ok()?;
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let all = manifest["plugins"].as_array()?.iter();
+    let recorded = all.filter_map(recorded).find(|library| library.path == path)?;
+    Some(Box::leak(Box::new(recorded)))
+}
+
+/// A library from its record in a manifest.
+fn recorded(record: &Value) -> Option<Library> {
+    let text = |key: &str| record[key].as_str().map(str::to_owned);
+    let version = |text: &str| {
+        let (major, minor) = text.split_once('.')?;
+        Some((major.parse().ok()?, minor.parse().ok()?))
+    };
+    let plugins = record["plugins"].as_array()?.iter().filter_map(Value::as_str);
+    let plugin = |name: &str| name.split_once('.').map(|(k, n)| (k.to_owned(), n.to_owned()));
+    Some(Library {
+        path: text("path")?.into(),
+        sha256: text("sha256")?,
+        name: text("name")?,
+        version: text("version")?,
+        sdk: text("sdk")?,
+        abi: record["abi"].as_str().and_then(version),
+        plugins: plugins.filter_map(plugin).collect(),
+    })
 }
 
 /// A library of plugins, as recorded in the manifest.

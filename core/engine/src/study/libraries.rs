@@ -14,6 +14,7 @@ use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::host::{declared, library};
+use crate::stage::manifest;
 
 /// Plugins from third parties, in libraries or in Python files. Their code runs with all rights of the program: load only libraries you trust.
 /// `lacuna check STUDY` lists the libraries without loading them.
@@ -173,20 +174,32 @@ pub struct Libraries {
     pub seen: Vec<Seen>,
     /// The libraries that were loaded.
     pub loaded: Vec<&'static Library>,
+    /// The libraries of a finished run that cannot be loaded any more, as its manifest describes them.
+    pub absent: Vec<&'static Library>,
 }
 
 impl Libraries {
+    /// All libraries that the plugins of the study come from.
+    pub fn all(&self) -> impl Iterator<Item = &'static Library> {
+        self.loaded.iter().chain(&self.absent).copied()
+    }
+
     /// Plugins that stand for those that the libraries are said to hold.
     pub(super) fn declared(&self) -> Vec<AnyEntry> {
         let all = self.seen.iter().filter_map(|seen| Some((seen, seen.record.as_ref()?)));
-        all.flat_map(|(seen, record)| declared::entries(&seen.path, record)).collect()
+        let seen =
+            all.flat_map(|(seen, record)| declared::entries(&seen.path, &record.plugins, None));
+        let absent = self.absent.iter();
+        let absent = absent.flat_map(|l| declared::entries(&l.path, &l.plugins, Some(l)));
+        seen.chain(absent).collect()
     }
 }
 
-/// `[plugins]`: looks at the files, and loads them unless the study is only checked; `None` after complaints.
+/// `[plugins]`: looks at the files, and loads them unless the study is only checked; `None` after complaints. `run` is the
+/// folder of the study's file: in a run directory its manifest stands for a file that is gone or has changed.
 pub(super) fn libraries(
     root: &Node,
-    directory: &Path,
+    (run, directory): (&Path, &Path),
     purpose: Use,
     problems: &mut Problems,
 ) -> Option<Libraries> {
@@ -205,6 +218,11 @@ pub(super) fn libraries(
             let interpreter = section.interpreter.as_deref();
             let as_python = in_python.then_some(interpreter);
             if let Err(reason) = bring(file, as_python, directory, purpose, &mut libraries) {
+                let known = || manifest::library(run, &directory.join(&file.path));
+                if let Some(library) = (purpose == Use::Look).then(known).flatten() {
+                    libraries.absent.push(library);
+                    continue;
+                }
                 let what = if in_python { "file of plugins" } else { "library of plugins" };
                 let message =
                     format!("the {what} {} cannot be used: {reason}", file.path.display());

@@ -98,9 +98,12 @@ fn finish(
         overrides::apply(&mut root, arguments, &common_keys, &mut sources, &mut problems);
         take_out(&mut root);
         let named = gives_its_name(path, &root, &sources);
-        let libraries = libraries(&root, &directory(path, &root), purpose, &mut problems)?;
+        let run = path.parent().unwrap_or(Path::new("."));
+        let folders = (run, &*directory(path, &root));
+        let libraries = libraries(&root, folders, purpose, &mut problems)?;
         seen.clone_from(&libraries.seen);
-        let declared = if purpose == Use::Check { libraries.declared() } else { Vec::new() };
+        let is_declared = purpose == Use::Check || !libraries.absent.is_empty();
+        let declared = if is_declared { libraries.declared() } else { Vec::new() };
         declaring(declared, || {
             let folder = directory(path, &root);
             groups_as_scenarios(&mut root, &folder, &mut problems);

@@ -10,6 +10,7 @@ use super::dependence::Sections;
 use super::file::{ResponseSection, ScenarioSection};
 use super::gap::companion::Companion;
 use super::gap::{Gap, Swap};
+use super::libraries::PluginsSection;
 use super::plain::Study;
 use super::table::{SECTIONS, written};
 use super::unknowns::Unknown;
@@ -62,7 +63,7 @@ pub(super) fn table(
         .collect();
     let mut whole = Table::new();
     whole.insert("study".to_owned(), about.into());
-    if !study.libraries.section.load.is_empty() {
+    if study.libraries.section != PluginsSection::default() {
         whole.insert("plugins".to_owned(), to_table(&study.libraries.section)?.into());
     }
     whole.insert("parameter".to_owned(), parameters?.into());
