@@ -8,6 +8,7 @@ mod near;
 mod population;
 mod predicting;
 mod sample;
+mod slopes;
 
 use lacuna::data::{Draws, Observations, Statistics, Unit};
 use lacuna::diagnose::Diagnosis;

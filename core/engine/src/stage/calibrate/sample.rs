@@ -11,6 +11,7 @@ use lacuna::run::{Progress, Stop};
 use lacuna_linalg::Matrix;
 
 use super::estimated::{Estimated, LikelihoodEstimate};
+use super::slopes::contradiction;
 use super::{Calibrated, Coordinate, Outcome, near, population};
 use crate::posterior::Posterior;
 use crate::stage::sampling::{self, Length, Sampled};
@@ -41,6 +42,13 @@ pub(super) fn sample(
     let mut maxima = if let Some(estimated) = &estimated {
         vec![estimated.maximum()?]
     } else {
+        if !asked.quick
+            && gives_slopes(study)
+            && let Some(text) =
+                contradiction(posterior, &coordinates(posterior), &random.named("slopes"))
+        {
+            progress.warn(&text);
+        }
         let maxima = maxima(posterior, &asked.stated, &search);
         sampling::broken(posterior)?;
         maxima?
@@ -120,6 +128,13 @@ pub(super) fn sample(
         populations: population::outcomes(study, posterior, &kept),
     };
     Ok(Calibrated { draws, statistics: sampled.statistics, outcome })
+}
+
+/// True for a study whose model or surrogate gives derivatives of its own: differences need no look at differences, which
+/// would be runs of the model.
+fn gives_slopes(study: &Study) -> bool {
+    let of_model = || study.model.as_ref().is_none_or(|m| m.built.plugin.gradient().is_some());
+    study.surrogate.is_some() || of_model()
 }
 
 /// Starting points, one per chain.
