@@ -95,7 +95,7 @@ impl Problem {
         responses: &Matrix,
     ) -> Result<Box<dyn Emulator>, lacuna::run::Stop> {
         let training =
-            Training { parameters: &self.parameters, layouts: &self.layouts, points, responses };
+            Training { parameters: &self.parameters, layouts: &self.layouts, points, responses, gradients: None };
         let stream = Stream::root(6).named("surrogate");
         surrogate.fit(&training, &stream, &Progress::new(&Silent))
     }

@@ -10,7 +10,7 @@ use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
     MeasuredFindings, Role, RunInput, SurrogateFindings,
 };
-use crate::screening::{Dependence, Screening};
+use crate::screening::{ActiveSubspace, Dependence, Screening};
 use crate::stage::screen::FlaggedCurve;
 use crate::stage::validate::{ValidationCase, ValidationFindings};
 
@@ -149,6 +149,12 @@ fn ensemble() -> EnsembleFindings {
             Dependence { index: 0.12, p: 1e-9 },
             Dependence { index: 0.31, p: 1e-12 },
         ])),
+        active: Some(ActiveSubspace {
+            eigenvalues: vec![0.9, 0.2, 0.004],
+            spread: vec![(0.8, 1.0), (0.1, 0.3), (0.003, 0.005)],
+            activity: vec![0.004, 0.2, 0.9],
+            runs: 500,
+        }),
         points,
     }
 }
