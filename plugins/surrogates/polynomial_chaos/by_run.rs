@@ -31,8 +31,7 @@ fn rows(run: usize, runs: usize, height: usize) -> impl Iterator<Item = usize> {
 fn left_out(blocks: &[Matrix], residual: &[f64]) -> Vec<f64> {
     let runs = blocks.len();
     let error = |(run, block): (usize, &Matrix)| {
-        let mut own: Vec<f64> =
-            rows(run, runs, residual.len()).map(|row| residual[row]).collect();
+        let mut own: Vec<f64> = rows(run, runs, residual.len()).map(|row| residual[row]).collect();
         let Ok(factor) = Cholesky::new(block) else { return f64::INFINITY };
         factor.solve(&mut own);
         own[0]
@@ -66,7 +65,13 @@ impl ByRun {
 
     /// Returns the sum of squares of the errors at runs left out, times the correction for the number of terms; `None`
     /// if the set has hardly grown since the last assessment and is not the `last`.
-    pub fn squares(&mut self, residual: &[f64], terms: usize, trace: f64, last: bool) -> Option<f64> {
+    pub fn squares(
+        &mut self,
+        residual: &[f64],
+        terms: usize,
+        trace: f64,
+        last: bool,
+    ) -> Option<f64> {
         if terms < self.next && !last {
             return None;
         }

@@ -196,7 +196,8 @@ impl<'a> ActiveSet<'a> {
 
     /// Returns `tr (Psi' Psi)^-1` of the first `k` active terms and the constant.
     pub fn trace(&self, k: usize) -> f64 {
-        1.0 / self.dictionary.columns().columns() as f64 + if k == 0 { 0.0 } else { self.traces[k - 1] }
+        1.0 / self.dictionary.columns().columns() as f64
+            + if k == 0 { 0.0 } else { self.traces[k - 1] }
     }
 
     /// Returns the orthonormal columns that the steps from `first` on added, one per row.

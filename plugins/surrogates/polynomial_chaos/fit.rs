@@ -58,9 +58,7 @@ pub(super) fn fit(
         coordinates,
         sets: options.sets(dimension),
         criterion: match &slopes {
-            Some(slopes) => {
-                Criterion::ByRun { runs, dimension, known: runs + slopes.known() }
-            }
+            Some(slopes) => Criterion::ByRun { runs, dimension, known: runs + slopes.known() },
             None => Criterion::new(options.selection, runs, stream),
         },
         slopes,
@@ -195,11 +193,8 @@ impl Problem<'_> {
         let runs = self.points.rows();
         let few = runs < 10 * self.coordinates.len();
         if few || 2 * optimistic > outputs {
-            let why = if few {
-                "ten runs per parameter"
-            } else {
-                "three runs per term in most outputs"
-            };
+            let why =
+                if few { "ten runs per parameter" } else { "three runs per term in most outputs" };
             progress.warn(&format!(
                 "{runs} runs are fewer than {why}: the surrogate's leave-one-out errors are likely too small; \
                  use the errors at `validation` runs instead"
@@ -255,8 +250,11 @@ impl Problem<'_> {
         }
         let fits = search.refit(outputs, &found)?;
         let runs = self.points.rows();
-        let fits: Vec<Fit> =
-            outputs.iter().zip(fits).map(|(o, fit)| fit.unwrap_or_else(|| constant(o, runs))).collect();
+        let fits: Vec<Fit> = outputs
+            .iter()
+            .zip(fits)
+            .map(|(o, fit)| fit.unwrap_or_else(|| constant(o, runs)))
+            .collect();
         Ok(self.assembled(outputs, &found, &fits))
     }
 

@@ -298,11 +298,8 @@ impl Surrogate for PolynomialChaos {
     }
 
     fn takes_gradients(&self) -> Result<(), String> {
-        let takes = [
-            Solver::LeastAngleRegression,
-            Solver::OrthogonalMatchingPursuit,
-            Solver::LeastSquares,
-        ];
+        let takes =
+            [Solver::LeastAngleRegression, Solver::OrthogonalMatchingPursuit, Solver::LeastSquares];
         if !takes.contains(&self.solver) {
             let names: Vec<String> = takes.map(|s| format!("`{}`", s.name())).into();
             let (own, others) = (self.solver.name(), names.join(", "));

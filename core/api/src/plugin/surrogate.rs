@@ -18,7 +18,7 @@ pub trait Surrogate: Component {
         progress: &Progress<'_>,
     ) -> Result<Box<dyn Emulator>, Stop>;
 
-    /// Whether the surrogate learns from [`Training::gradients`].
+    /// Accepts or refuses [`Training::gradients`].
     ///
     /// # Errors
     /// The reason why it does not, as a clause such as `it is fitted to the responses alone`.

@@ -87,9 +87,9 @@ fn findings(
         fields: fields(study, calibrated),
         prior: study.prior_facts(),
         layouts: study.layouts.clone(),
-        ensemble: all
-            .problem
-            .and_then(|problem| Some(ensemble(study, problem, problem.data.value.ensemble.as_ref()?))),
+        ensemble: all.problem.and_then(|problem| {
+            Some(ensemble(study, problem, problem.data.value.ensemble.as_ref()?))
+        }),
         measured: measured.map(|m| measurements(study, m)),
         surrogate: all.problem.and_then(|problem| surrogate(problem, all.validated)),
         warnings: {

@@ -177,8 +177,7 @@ fn a_ridge_has_one_direction() {
     let points = Matrix::from_fn(40, 3, |_, _| uniform(&mut rng));
     let along = |x: &[f64]| x.iter().zip(&weights).map(|(x, w)| x * w).sum::<f64>();
     let responses = values(&points, |x| along(x).sin());
-    let mut gradients =
-        Matrix::from_fn(40, 3, |i, j| along(points.row(i)).cos() * weights[j]);
+    let mut gradients = Matrix::from_fn(40, 3, |i, j| along(points.row(i)).cos() * weights[j]);
     gradients.row_mut(7).fill(f64::NAN);
     let blocks = || std::iter::once(0..1);
     let found = active_subspace(&gradients, &widths, &responses, blocks(), &Stream::root(1));

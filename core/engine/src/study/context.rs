@@ -4,7 +4,7 @@ mod companion;
 mod cut;
 mod effects;
 mod gap;
-mod gradients;
+pub(super) mod gradients;
 mod inputs;
 mod inside;
 mod more_runs;

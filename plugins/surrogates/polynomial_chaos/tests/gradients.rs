@@ -7,7 +7,7 @@ use lacuna::plugin::surrogate::{Emulator, Surrogate, Training};
 use lacuna::run::{Progress, Silent, Stop};
 use lacuna_linalg::Matrix;
 
-use super::functions::borehole;
+use super::functions::{borehole, welch};
 use super::many_inputs::{Case, cases, slopes};
 use crate::surrogates::polynomial_chaos::{Degree, Family, PolynomialChaos, Selection, Solver};
 use crate::surrogates::principal_components::Components;
@@ -83,7 +83,8 @@ fn cubic(x: &[f64]) -> (Vec<f64>, Vec<f64>) {
         // A chaotic sequence of numbers from -1 to 1.
         weight = 1.0 - 2.0 * weight * weight;
         let factor = |j: usize, less: usize| x[j].powi((powers[j] - less) as i32);
-        let product = |from: usize| (0..4).filter(|j| *j != from).map(|j| factor(j, 0)).product::<f64>();
+        let product =
+            |from: usize| (0..4).filter(|j| *j != from).map(|j| factor(j, 0)).product::<f64>();
         value += weight * product(4);
         for (j, slope) in gradient.iter_mut().enumerate().filter(|(j, _)| powers[*j] > 0) {
             *slope += weight * powers[j] as f64 * factor(j, 1) * product(j);
@@ -197,6 +198,33 @@ fn unknown_slopes_are_left_out() {
     assert!(error < 1e-10, "{error}");
 }
 
+/// At the cost of 20 runs the error without derivatives is 0.12 to 0.17 (docs/many_inputs.md), that of the peer in
+/// `bench/many_inputs.py`, with derivatives at ten runs, 0.0029 and 0.0011 for these designs. The stated error comes from the
+/// same ten runs, and is up to five times too small.
+#[test]
+fn ten_runs_of_the_borehole_with_slopes_are_worth_more_than_twenty() {
+    for seed in [1, 2] {
+        let case = Case::new(&borehole(), 10, seed);
+        let gradients = slopes(&borehole(), &case);
+        let emulator = case.fit_to(&PolynomialChaos::default(), Some(&gradients));
+        let (error, stated) = (case.error(&*emulator), emulator.fit_error().relative[0]);
+        assert!(error < 0.012, "{error}");
+        assert!((error / 8.0..8.0 * error).contains(&stated), "{stated} for {error}");
+    }
+}
+
+/// With derivatives at 50 runs the peer in `bench/many_inputs.py` has the errors 3.6e-6 and 2.7e-6 for these designs; with 100
+/// runs and no derivatives `polynomial_chaos` has 2e-4 to 8e-4.
+#[test]
+fn fifty_runs_of_twenty_inputs_with_slopes_find_the_function_of_welch() {
+    let case = Case::new(&welch(), 50, 1);
+    let gradients = slopes(&welch(), &case);
+    let emulator = case.fit_to(&PolynomialChaos::default(), Some(&gradients));
+    let (error, stated) = (case.error(&*emulator), emulator.fit_error().relative[0]);
+    assert!(error < 2.7e-6, "{error}");
+    assert!((error / 8.0..8.0 * error).contains(&stated), "{stated} for {error}");
+}
+
 #[test]
 fn the_bits_do_not_depend_on_the_number_of_threads() {
     let case = Case::new(&borehole(), 20, 1);
@@ -233,10 +261,12 @@ fn slopes_of_the_wrong_shape_are_refused() {
 #[test]
 #[ignore = "takes minutes: cargo test -p lacuna-plugins --lib -- --ignored --nocapture errors_with_gradients"]
 fn errors_with_gradients() {
-    println!("relative error at 2000 new points (stated error; seconds) of half as many runs with derivatives, two designs");
+    println!(
+        "relative error at 2000 new points (stated error; seconds) of half as many runs with derivatives, two designs"
+    );
     let only = std::env::var("LACUNA_FUNCTION").unwrap_or_default();
     for (function, sizes) in &cases() {
-        if !function.name.starts_with(&only) || function.designs.len() > 50 {
+        if !function.name.starts_with(&only) {
             continue;
         }
         for &runs in *sizes {

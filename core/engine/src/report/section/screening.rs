@@ -23,7 +23,11 @@ pub fn part(ensemble: &EnsembleFindings, numbers: &mut Numbers) -> Markup {
 const MOST_LISTED: usize = 10;
 
 /// The eigenvalues of the active subspace, beside the inputs along which the response changes most.
-fn directions(found: &ActiveSubspace, ensemble: &EnsembleFindings, numbers: &mut Numbers) -> Markup {
+fn directions(
+    found: &ActiveSubspace,
+    ensemble: &EnsembleFindings,
+    numbers: &mut Numbers,
+) -> Markup {
     let mut table =
         Table::new(&["direction"], &["eigenvalue", "lower", "upper", "share up to here"]);
     let total: f64 = found.eigenvalues.iter().sum();

@@ -44,7 +44,7 @@ pub struct Subspace {
 /// Eigenvalue, with the central 95 % of its values over resampled runs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Eigenvalue {
-    /// Its value.
+    /// Value from all runs.
     pub value: Quantity,
     /// Lower end.
     pub q025: f64,

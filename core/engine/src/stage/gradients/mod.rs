@@ -103,10 +103,6 @@ pub fn stage(
         return Ok(None);
     };
     let Some(simulator) = Simulator::of(study)? else { return Ok(None) };
-    let gradient = simulator.model.gradient().ok_or_else(|| {
-        let text = format!("the model `{}` gives no derivatives of its response", section.built.name);
-        Stop::new(text).help("take `gradients` out of `[surrogate]`")
-    })?;
     let ensemble = data.runs()?;
     let names: Vec<String> = fitting.training.iter().map(|&i| ensemble.runs[i].clone()).collect();
     let points = ensemble.points.select_rows(&fitting.training);
@@ -116,8 +112,11 @@ pub fn stage(
     let folder = fitting.folder.beside(Stage::Simulate, "gradients");
     observer.begin(LABEL, "run", names.len() as u64);
     let calls = Calls::of_all(calls_file(run, &made_from)?);
-    let asked = Asked { study, simulator: &simulator, gradient, calls: &calls };
     let kept = run.keep(&folder, &json!([made_from, names, points]), observer, |_| {
+        let without =
+            || Stop::new(format!("the model `{}` gives no derivatives", section.built.name));
+        let gradient = simulator.model.gradient().ok_or_else(without)?;
+        let asked = Asked { study, simulator: &simulator, gradient, calls: &calls };
         Verification::of(&asked, fitting.parameters, &names, &points).run(observer)?;
         asked.all(&names, points.clone(), observer)
     })?;
@@ -204,7 +203,12 @@ impl Asked<'_> {
     }
 
     /// The derivatives under the conditions of one scenario.
-    fn under(&self, place: usize, setting: &Setting<'_>, point: &[f64]) -> Result<Vec<f64>, Unknown> {
+    fn under(
+        &self,
+        place: usize,
+        setting: &Setting<'_>,
+        point: &[f64],
+    ) -> Result<Vec<f64>, Unknown> {
         if let Some(known) = self.calls.response(place, point) {
             return Ok(known);
         }
