@@ -116,7 +116,6 @@ fn scales(responses: &Matrix, blocks: impl Iterator<Item = Range<usize>>) -> Opt
             scales[block].fill(variance.sqrt().recip());
         }
     }
-    let size = f64::sqrt(varying);
-    scales.iter_mut().for_each(|scale| *scale /= size.max(1.0));
-    (varying > 0.0).then_some(scales)
+    let size = f64::sqrt(varying).max(1.0);
+    (varying > 0.0).then(|| scales.into_iter().map(|scale| scale / size).collect())
 }

@@ -112,9 +112,7 @@ fn mean(squares: &[Matrix], which: &[usize]) -> Matrix {
 }
 
 fn decreasing(matrix: &Matrix) -> Option<Vec<f64>> {
-    let mut values = symmetric_eigen(matrix).ok()?.values;
-    values.reverse();
+    let values = symmetric_eigen(matrix).ok()?.values;
     // Rounding errors make the smallest ones negative.
-    values.iter_mut().for_each(|value| *value = value.max(0.0));
-    Some(values)
+    Some(values.into_iter().rev().map(|value| value.max(0.0)).collect())
 }
