@@ -198,7 +198,7 @@ fn unknown_slopes_are_left_out() {
     assert!(error < 1e-10, "{error}");
 }
 
-/// At the cost of 20 runs the error without derivatives is 0.12 to 0.17 (docs/many_inputs.md), that of the peer in
+/// At the cost of 20 runs the error without derivatives is 0.12 to 0.17 (`docs/many_inputs.md`), that of the peer in
 /// `bench/many_inputs.py`, with derivatives at ten runs, 0.0029 and 0.0011 for these designs. The stated error comes from the
 /// same ten runs, and is up to five times too small.
 #[test]
