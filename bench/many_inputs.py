@@ -1,4 +1,4 @@
-"""Surrogates of many inputs that Lacuna does not have, on the runs of the table in docs/many_inputs.md.
+"""Surrogates of many inputs that Lacuna does not have, or has in another form, on the runs of the table in docs/many_inputs.md.
 
     mkdir runs
     LACUNA_RUNS=$PWD/runs cargo test -p lacuna-plugins --lib -- --ignored runs_of_many_inputs

@@ -21,6 +21,7 @@ mod forced_oscillator;
 mod forward;
 mod gap;
 mod gate;
+mod gradients;
 mod hierarchy;
 mod intervals;
 mod kill;

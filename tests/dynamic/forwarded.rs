@@ -339,8 +339,13 @@ fn emulators_and_their_sums_are_the_same() {
         let [own, other] = pair::<dyn Surrogate>(name, options).map(|built| {
             let fit = |k: f64| {
                 let (layouts, responses) = (&layouts, &of(k));
-                let training =
-                    Training { parameters: &parameters, layouts, points: &points, responses };
+                let training = Training {
+                    parameters: &parameters,
+                    layouts,
+                    points: &points,
+                    responses,
+                    gradients: None,
+                };
                 let progress = Progress::new(&Silent);
                 built.plugin.fit(&training, &Stream::root(2), &progress).unwrap()
             };

@@ -145,6 +145,7 @@ pub fn fitted(surrogate: &dyn Surrogate) -> Result<Box<dyn Emulator>, String> {
         layouts: &layouts,
         points: &points,
         responses: &responses,
+        gradients: None,
     };
     let fit = surrogate.fit(&training, &Stream::root(1), &Progress::new(&Silent));
     fit.map_err(|stop| stop.message)

@@ -68,6 +68,7 @@ pub fn emulator() -> &'static (Box<dyn Emulator>, CommonError) {
             layouts: &layouts,
             points: &points,
             responses: &responses,
+            gradients: None,
         };
         let fitted = surrogate.plugin.fit(&training, &Stream::root(2), &Progress::new(&Silent));
         let emulator = fitted.unwrap();

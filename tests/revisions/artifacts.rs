@@ -281,6 +281,7 @@ fn surrogate(_: &str, surrogate: &dyn Surrogate, bits: &mut Bits) {
         layouts: &layouts,
         points: &points,
         responses: &responses,
+        gradients: None,
     };
     let emulator = surrogate.fit(&training, &Stream::root(2), &Progress::new(&Silent)).unwrap();
     let new = Matrix::from_rows(2, [[0.3, 1.7], [1.0, 1.0], [1.9, 0.1]]);

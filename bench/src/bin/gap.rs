@@ -131,7 +131,8 @@ fn emulator(
     let responses = Matrix::from_rows(layouts.len(), points.iter_rows().map(model));
     let chaos = registry::from_text::<dyn Surrogate>("polynomial_chaos", "degree = { max = 6 }");
     let surrogate = chaos.map_err(|e| text(&e))?;
-    let training = Training { parameters, layouts, points: &points, responses: &responses };
+    let training =
+        Training { parameters, layouts, points: &points, responses: &responses, gradients: None };
     let fitted = surrogate.plugin.fit(&training, &Stream::root(3), &Progress::new(&Silent));
     let emulator = fitted.map_err(|e| text(&e))?;
     let residuals = &emulator.fit_error().residuals;

@@ -143,7 +143,8 @@ fn emulator(
         degree: Degree::Fixed(degree),
         ..PolynomialChaos::default()
     };
-    let training = Training { parameters, layouts, points: &runs, responses: &responses };
+    let training =
+        Training { parameters, layouts, points: &runs, responses: &responses, gradients: None };
     Ok(options.fit(&training, &Stream::root(2), &Progress::new(&Silent))?)
 }
 

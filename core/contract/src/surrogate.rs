@@ -20,6 +20,7 @@ use crate::judge::{Check, agree, calm, judge, layout, refused, same_on_threads, 
 ///   emulator is the product of its basis and its coefficients, and its sums of squares are correct to within their
 ///   stated error.
 /// - Sobol' indices are fractions: first-order no larger than total, between 0 and 1.
+/// - A surrogate that takes derivatives is better with those of 15 runs, one of which has none, than without.
 /// - A weighted sum of emulators, if implemented, has the sum of their responses and slopes.
 /// - The covariances of its errors between points, if known, are symmetric, and no variance that follows from them
 ///   exceeds the one that the emulator states.
@@ -28,9 +29,10 @@ use crate::judge::{Check, agree, calm, judge, layout, refused, same_on_threads, 
 /// - Runs that are too few, of unequal number or not finite are rejected.
 pub fn surrogate(name: &str, surrogate: &dyn Surrogate) -> Result<(), Vec<String>> {
     let problem = Problem::new();
-    let checks: [Check<'_>; 8] = [
+    let checks: [Check<'_>; 9] = [
         ("emulates", Box::new(|| emulates(surrogate, &problem))),
         ("knows its derivatives", Box::new(|| knows_its_derivatives(surrogate, &problem))),
+        ("learns from derivatives", Box::new(|| learns_from_derivatives(surrogate, &problem))),
         ("shares out the variance", Box::new(|| shares_out_the_variance(surrogate, &problem))),
         ("knows its errors", Box::new(|| knows_its_errors(surrogate, &problem))),
         ("adds up", Box::new(|| adds_up(surrogate, &problem))),
@@ -84,7 +86,7 @@ impl Problem {
     }
 
     fn fit(&self, surrogate: &dyn Surrogate) -> Result<Box<dyn Emulator>, String> {
-        let fitted = self.fit_to(surrogate, &self.points, &self.responses);
+        let fitted = self.fit_to(surrogate, &self.points, &self.responses, None);
         fitted.map_err(|stop| format!("sound runs are refused: {stop}"))
     }
 
@@ -93,9 +95,10 @@ impl Problem {
         surrogate: &dyn Surrogate,
         points: &Matrix,
         responses: &Matrix,
+        gradients: Option<&Matrix>,
     ) -> Result<Box<dyn Emulator>, lacuna::run::Stop> {
-        let training =
-            Training { parameters: &self.parameters, layouts: &self.layouts, points, responses };
+        let (parameters, layouts) = (&self.parameters, &self.layouts);
+        let training = Training { parameters, layouts, points, responses, gradients };
         let stream = Stream::root(6).named("surrogate");
         surrogate.fit(&training, &stream, &Progress::new(&Silent))
     }
@@ -149,6 +152,36 @@ fn emulates(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> 
         agree("alone, output", alone.row(0), mean.row(i), 1e-11)?;
     }
     Ok(())
+}
+
+fn learns_from_derivatives(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
+    if surrogate.takes_gradients().is_err() {
+        return Ok(());
+    }
+    let few: Vec<usize> = (0..15).collect();
+    let (points, responses) =
+        (problem.points.select_rows(&few), problem.responses.select_rows(&few));
+    let of_run = |point: &[f64]| -> Vec<f64> {
+        let by = |j: usize, step: f64| slope(truth, point, j, step);
+        by(0, 1e-5).into_iter().zip(by(1, 1e-4)).flat_map(|(a, b)| [a, b]).collect()
+    };
+    let mut gradients = Matrix::from_rows(20, points.iter_rows().map(of_run));
+    gradients.row_mut(4).fill(f64::NAN);
+    let exact = Matrix::from_rows(10, problem.fresh.iter_rows().map(truth));
+    let error = |gradients: Option<&Matrix>| -> Result<f64, String> {
+        let fitted = problem.fit_to(surrogate, &points, &responses, gradients);
+        let mean = fitted.map_err(|stop| stop.to_string())?.mean(&problem.fresh);
+        shaped("the mean", &mean, 40, 10)?;
+        let pairs = mean.as_slice().iter().zip(exact.as_slice());
+        Ok(pairs.map(|(a, b)| (a - b).powi(2)).sum())
+    };
+    // Options may need more runs than these.
+    let Ok(without) = error(None) else { return Ok(()) };
+    let with = error(Some(&gradients))?;
+    if with < without {
+        return Ok(());
+    }
+    Err(format!("the sum of squared errors is {with} with derivatives, {without} without"))
 }
 
 fn knows_its_derivatives(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
@@ -258,7 +291,7 @@ fn adds_up(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
     let half: Vec<usize> = (0..RUNS / 2).collect();
     let few = (problem.points.select_rows(&half), problem.responses.select_rows(&half));
     let first = problem.fit(surrogate)?;
-    let Ok(second) = problem.fit_to(surrogate, &few.0, &few.1) else { return Ok(()) };
+    let Ok(second) = problem.fit_to(surrogate, &few.0, &few.1, None) else { return Ok(()) };
     let weights = [(0..10).map(|j| 0.5 + f64::from(j)).collect::<Vec<f64>>(), vec![-0.25; 10]];
     let offset: Vec<f64> = (0..10).map(|j| f64::from(j) - 3.0).collect();
     let bytes = [&first, &second].map(|e| e.save().map_err(|stop| stop.to_string()));
@@ -346,7 +379,7 @@ fn refuses_bad_runs(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), 
         ("a run without a response", points, &short),
         ("a fit to no runs", &none.0, &none.1),
     ] {
-        refused(what, || problem.fit_to(surrogate, points, responses))?;
+        refused(what, || problem.fit_to(surrogate, points, responses, None))?;
     }
     Ok(())
 }

@@ -152,6 +152,12 @@ impl Folder {
         self.stage.named(format!("{}-{part}", self.name))
     }
 
+    /// A further folder beside this one, for what another stage makes for it: such as `4-surrogate-gradients`, with runs of
+    /// the model, which depend on code as little as those of the design.
+    pub fn beside(&self, stage: Stage, part: &str) -> Self {
+        stage.named(format!("{}-{part}", self.name))
+    }
+
     /// Name of the folder in the run directory.
     pub fn name(&self) -> &str {
         &self.name

@@ -83,7 +83,7 @@ impl Case {
 
     pub fn training(&self) -> Training<'_> {
         let Self { parameters, layouts, points, responses, .. } = self;
-        Training { parameters, layouts, points, responses }
+        Training { parameters, layouts, points, responses, gradients: None }
     }
 }
 

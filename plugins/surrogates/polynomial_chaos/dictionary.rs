@@ -2,8 +2,9 @@
 
 use std::borrow::Cow;
 
-use lacuna_linalg::{Matrix, PackedUpper, gram, multiply, vector};
+use lacuna_linalg::{Matrix, PackedUpper, multiply, vector};
 
+use super::columns::{Columns, SlopeColumns};
 use super::gram::Gram;
 
 /// Squared fraction of a new column outside the span of the active ones below which it counts as dependent.
@@ -11,43 +12,61 @@ const DEPENDENT: f64 = 1e-8;
 
 /// Basis functions of one set at the runs, standardised, with everything that the outputs share.
 pub(super) struct Dictionary {
-    /// Standardised basis functions (`terms x runs`); zero for those that are constant over the runs.
-    columns: Matrix,
+    /// Standardised basis functions; zero for those that are constant over the runs.
+    columns: Columns,
     gram: Gram,
     means: Vec<f64>,
-    /// Length of each centred basis function; zero for a constant.
+    /// Length of each basis function with centred values; zero for a constant.
     lengths: Vec<f64>,
 }
 
 impl Dictionary {
-    /// Standardises the basis functions at the runs (`runs x terms`). All inner products are computed at once if
-    /// `whole`, otherwise those of the selected terms.
-    pub fn new(basis: &Matrix, whole: bool) -> Self {
-        let mut columns = basis.transposed();
-        let runs = columns.columns();
+    /// Standardises the basis functions at the runs (`runs x terms`), with their slopes if those of the responses are
+    /// known. All inner products are computed at once if `whole`, otherwise those of the selected terms.
+    pub fn new(basis: &Matrix, slopes: Option<SlopeColumns>, whole: bool) -> Self {
+        let (mut values, mut slopes) = (basis.transposed(), slopes);
+        let runs = values.columns();
         let (mut means, mut lengths) = (Vec::new(), Vec::new());
-        for t in 0..columns.rows() {
-            let column = columns.row_mut(t);
+        for t in 0..values.rows() {
+            let column = values.row_mut(t);
             let size = vector::norm(column);
             let mean = column.iter().sum::<f64>() / runs as f64;
             for x in &mut *column {
                 *x -= mean;
             }
-            let length = vector::norm(column);
-            let varies = length > 1e-10 * size;
+            let mut length = vector::norm(column);
+            let mut varies = length > 1e-10 * size;
+            if let Some(slopes) = &mut slopes {
+                let squares: f64 = slopes
+                    .entries(t)
+                    .map(|i| vector::dot(slopes.slopes.row(i), slopes.slopes.row(i)))
+                    .sum();
+                length = (length * length + squares).sqrt();
+                varies |= squares > 0.0;
+                let scale = if varies { length.recip() } else { 0.0 };
+                for i in slopes.entries(t) {
+                    slopes.slopes.row_mut(i).iter_mut().for_each(|x| *x *= scale);
+                }
+            }
             for x in column {
                 *x = if varies { *x / length } else { 0.0 };
             }
             means.push(mean);
             lengths.push(if varies { length } else { 0.0 });
         }
-        let gram = if whole { Gram::whole(&columns) } else { Gram::rows(columns.rows()) };
+        let columns = Columns::new(values, slopes);
+        let gram = if whole { Gram::whole(&columns) } else { Gram::rows(columns.terms()) };
         Self { columns, gram, means, lengths }
     }
 
-    /// Returns the standardised basis functions (`terms x runs`).
+    /// Returns the values of the standardised basis functions (`terms x runs`).
     pub fn columns(&self) -> &Matrix {
-        &self.columns
+        self.columns.values()
+    }
+
+    /// Returns the inner products of outputs, one per row, with all basis functions (`outputs x terms`).
+    pub fn correlations(&self, outputs: &Matrix) -> Matrix {
+        self.columns.correlations(outputs)
     }
 
     /// Returns the inner products of one basis function with all of them.
@@ -59,7 +78,7 @@ impl Dictionary {
     pub fn gram(&self) -> Cow<'_, Matrix> {
         match &self.gram {
             Gram::Whole(matrix) => Cow::Borrowed(matrix),
-            Gram::Rows(_) => Cow::Owned(gram(&self.columns.transposed())),
+            Gram::Rows(_) => Cow::Owned(self.columns.gram()),
         }
     }
 
@@ -78,18 +97,19 @@ impl Dictionary {
         self.lengths.iter().map(|length| *length > 0.0)
     }
 
-    /// Returns the maximum number of terms of a fit besides the constant, with one run to spare.
+    /// Returns the maximum number of terms of a fit besides the constant, with one run to spare; with slopes half the
+    /// number of rows, because the slopes of one run say less than other runs.
     pub fn most_terms(&self) -> usize {
-        let runs = self.columns.columns();
-        runs.saturating_sub(2).min(self.varies().filter(|varies| *varies).count())
+        let (runs, rows) = (self.columns().columns(), self.columns.height());
+        let most = if rows > runs { rows / 2 } else { runs.saturating_sub(2) };
+        most.min(self.varies().filter(|varies| *varies).count())
     }
 
-    /// Returns the maximum number of terms of a greedy choice: half the number of runs. Each greedy term also fits
+    /// Returns the maximum number of terms of a greedy choice: half the number of runs, or of rows with slopes. Each greedy term also fits
     /// the noise that the previous ones have left, so that the leave-one-out error is misleading if there are nearly
     /// as many terms as runs.
     pub fn most_greedy_terms(&self) -> usize {
-        let runs = self.columns.columns();
-        self.most_terms().min((runs / 2).max(1))
+        self.most_terms().min((self.columns.height() / 2).max(1))
     }
 }
 
@@ -98,7 +118,7 @@ impl Dictionary {
 pub(super) struct ActiveSet<'a> {
     dictionary: &'a Dictionary,
     terms: Vec<usize>,
-    /// The active columns (`active x runs`).
+    /// The active columns (`active x rows`).
     columns: Matrix,
     /// Inverse `R^-1` of the Cholesky factor of the active Gram matrix `G = R' R`.
     inverse: PackedUpper,
@@ -114,7 +134,7 @@ impl<'a> ActiveSet<'a> {
         Self {
             dictionary,
             terms: Vec::new(),
-            columns: Matrix::zeros(0, dictionary.columns.columns()),
+            columns: Matrix::zeros(0, dictionary.columns.height()),
             inverse: PackedUpper::new(),
             traces: Vec::new(),
             products: Vec::new(),
@@ -145,7 +165,7 @@ impl<'a> ActiveSet<'a> {
         inverse.push(next);
 
         self.terms.push(term);
-        self.columns.push_row(self.dictionary.columns.row(term));
+        self.columns.push_row(&self.dictionary.columns.column(term));
         self.traces.push(self.traces.last().copied().unwrap_or(0.0) + self.trace_of(&self.next));
         true
     }
@@ -176,7 +196,8 @@ impl<'a> ActiveSet<'a> {
 
     /// Returns `tr (Psi' Psi)^-1` of the first `k` active terms and the constant.
     pub fn trace(&self, k: usize) -> f64 {
-        1.0 / self.columns.columns() as f64 + if k == 0 { 0.0 } else { self.traces[k - 1] }
+        1.0 / self.dictionary.columns().columns() as f64
+            + if k == 0 { 0.0 } else { self.traces[k - 1] }
     }
 
     /// Returns the orthonormal columns that the steps from `first` on added, one per row.

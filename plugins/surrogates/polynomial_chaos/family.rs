@@ -58,6 +58,16 @@ impl Family {
         }
     }
 
+    /// Returns the factor under which the derivatives of the polynomials are orthogonal too (Szego, *Orthogonal
+    /// Polynomials* (1939), 4.21 and 5.1), at a value of the standard variable; 1 for polynomials without such a factor.
+    pub fn slope_weight(self, z: f64) -> f64 {
+        match self {
+            Self::Legendre | Self::Jacobi => (1.0 - z * z).max(0.0).sqrt(),
+            Self::Laguerre => z.max(0.0).sqrt(),
+            Self::Auto | Self::Hermite | Self::Arbitrary => 1.0,
+        }
+    }
+
     /// Returns the weights of the product of two polynomials in the family,
     /// `psi_m psi_n = sum_r weights[r] psi_{m + n - 2 r}` with `r` from 0 to the smaller degree; `None` if there is no
     /// such short form.

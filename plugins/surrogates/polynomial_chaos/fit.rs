@@ -14,6 +14,7 @@ use super::least_squares::Fit;
 use super::options::Solver;
 use super::quadrature::Projection;
 use super::search::{Best, Output, Search};
+use super::slopes::{self, Slopes};
 use super::terms::{Basis, Sets};
 use crate::surrogates::principal_components::PrincipalComponents;
 
@@ -48,12 +49,19 @@ pub(super) fn fit(
             Stop::new(format!("`surrogate.{}`: {}", fault.key, fault.message)).help(fault.help)
         );
     }
+    let coordinates = options.coordinates(training.parameters).map_err(Stop::new)?;
+    let dimension = coordinates.len();
+    let slopes = training.gradients.map(|g| Slopes::new(&coordinates, training.points, g));
     let problem = Problem {
         options,
         points: training.points,
-        coordinates: options.coordinates(training.parameters).map_err(Stop::new)?,
-        sets: options.sets(training.parameters.len()),
-        criterion: Criterion::new(options.selection, runs, stream),
+        coordinates,
+        sets: options.sets(dimension),
+        criterion: match &slopes {
+            Some(slopes) => Criterion::ByRun { runs, dimension, known: runs + slopes.known() },
+            None => Criterion::new(options.selection, runs, stream),
+        },
+        slopes,
         projection: match options.solver {
             Solver::Quadrature => {
                 Some(Projection::of(options.basis, training.parameters, training.points)?)
@@ -62,23 +70,35 @@ pub(super) fn fit(
         },
     };
     problem.check_level()?;
-    let outputs = outputs(training.responses);
+    let outputs = problem.outputs(training.responses, training.gradients);
     let expansion = match options.components {
         Some(components) => {
             let components = components.of(training.responses)?;
-            let scores = self::outputs(&components.scores);
+            let of_scores = training
+                .gradients
+                .map(|g| slopes::of_components(g, &components.directions, dimension));
+            let scores = problem.outputs(&components.scores, of_scores.as_ref());
             problem.fits(&scores, progress)?.multiplied_back(&outputs, &components)
         }
         None => problem.fits(&outputs, progress)?.expansion(None),
     };
-    warn(&expansion, runs, training.parameters.len(), progress);
+    problem.warn(&expansion, progress);
     problem.warn_of_limit(&expansion, progress);
     Ok(expansion)
 }
 
 /// Fails if there are fewer than 3 runs or a number is not finite; the message names the run and the place.
 pub(in crate::surrogates) fn check_numbers(training: &Training<'_>) -> Result<(), Stop> {
-    let Training { parameters, layouts, points, responses } = training;
+    let Training { parameters, layouts, points, responses, gradients } = training;
+    let wanted = responses.columns() * points.columns();
+    if let Some(found) = gradients.filter(|g| (g.rows(), g.columns()) != (points.rows(), wanted)) {
+        return Err(Stop::new(format!(
+            "the derivatives of the responses should be {} x {wanted}, not {} x {}",
+            points.rows(),
+            found.rows(),
+            found.columns()
+        )));
+    }
     if points.rows() != responses.rows() || points.rows() < 3 {
         return Err(Stop::new(format!(
             "a surrogate needs at least 3 runs with a response each, but there are {} points and {} \
@@ -127,31 +147,6 @@ fn outputs(responses: &Matrix) -> Vec<Output> {
     columns.iter_rows().map(output).collect()
 }
 
-/// Warns of outputs and errors that deserve caution.
-fn warn(expansion: &Expansion, runs: usize, dimension: usize, progress: &Progress<'_>) {
-    let Summary { constant, poor, optimistic, .. } = expansion.summary();
-    let outputs = expansion.fit_error().relative.len();
-    if *constant > 0 {
-        progress.warn(&format!(
-            "{constant} of {outputs} outputs do not vary over the runs and are emulated by their mean"
-        ));
-    }
-    if *poor > 0 {
-        progress.warn(&format!(
-            "{poor} of {outputs} outputs are emulated no better than by their mean"
-        ));
-    }
-    let few = runs < 10 * dimension;
-    if few || 2 * optimistic > outputs {
-        let why =
-            if few { "ten runs per parameter" } else { "three runs per term in most outputs" };
-        progress.warn(&format!(
-            "{runs} runs are fewer than {why}: the surrogate's leave-one-out errors are likely too small; \
-             use the errors at `validation` runs instead"
-        ));
-    }
-}
-
 /// Data shared by the fits of all outputs.
 struct Problem<'a> {
     options: &'a PolynomialChaos,
@@ -160,9 +155,53 @@ struct Problem<'a> {
     sets: Sets,
     criterion: Criterion,
     projection: Option<Projection>,
+    /// Slopes of the responses at the runs, if they are known.
+    slopes: Option<Slopes>,
 }
 
 impl Problem<'_> {
+    /// Returns the responses or scores with their slopes.
+    fn outputs(&self, responses: &Matrix, gradients: Option<&Matrix>) -> Vec<Output> {
+        let mut outputs = outputs(responses);
+        if let (Some(slopes), Some(gradients)) = (&self.slopes, gradients) {
+            for (o, output) in outputs.iter_mut().enumerate() {
+                output.centred.extend(slopes.of_output(gradients, o));
+            }
+        }
+        outputs
+    }
+
+    /// Returns the number of values and known slopes of an output at the runs.
+    fn known(&self) -> usize {
+        self.points.rows() + self.slopes.as_ref().map_or(0, Slopes::known)
+    }
+
+    /// Warns of outputs and errors that deserve caution.
+    fn warn(&self, expansion: &Expansion, progress: &Progress<'_>) {
+        let Summary { constant, poor, optimistic, .. } = expansion.summary();
+        let outputs = expansion.fit_error().relative.len();
+        if *constant > 0 {
+            progress.warn(&format!(
+                "{constant} of {outputs} outputs do not vary over the runs and are emulated by their mean"
+            ));
+        }
+        if *poor > 0 {
+            progress.warn(&format!(
+                "{poor} of {outputs} outputs are emulated no better than by their mean"
+            ));
+        }
+        let runs = self.points.rows();
+        let few = runs < 10 * self.coordinates.len();
+        if few || 2 * optimistic > outputs {
+            let why =
+                if few { "ten runs per parameter" } else { "three runs per term in most outputs" };
+            progress.warn(&format!(
+                "{runs} runs are fewer than {why}: the surrogate's leave-one-out errors are likely too small; \
+                 use the errors at `validation` runs instead"
+            ));
+        }
+    }
+
     /// Warns if the maximum number of terms allows a low degree only and outputs use it.
     fn warn_of_limit(&self, expansion: &Expansion, progress: &Progress<'_>) {
         let dimension = self.coordinates.len();
@@ -202,6 +241,7 @@ impl Problem<'_> {
             sets: &self.sets,
             criterion: &self.criterion,
             projection: self.projection.as_ref(),
+            slopes: self.slopes.as_ref(),
         };
         let found = search.run(outputs, progress)?;
         let unexplained = outputs.iter().zip(&found).any(|(o, b)| o.variance > 0.0 && b.is_none());
@@ -209,8 +249,12 @@ impl Problem<'_> {
             return Err(unexplained_output());
         }
         let fits = search.refit(outputs, &found)?;
-        let fits: Vec<Fit> =
-            outputs.iter().zip(fits).map(|(o, fit)| fit.unwrap_or_else(|| constant(o))).collect();
+        let runs = self.points.rows();
+        let fits: Vec<Fit> = outputs
+            .iter()
+            .zip(fits)
+            .map(|(o, fit)| fit.unwrap_or_else(|| constant(o, runs)))
+            .collect();
         Ok(self.assembled(outputs, &found, &fits))
     }
 
@@ -244,7 +288,7 @@ impl Problem<'_> {
             candidates: all.len(),
             constant: outputs.iter().filter(|o| o.variance == 0.0).count(),
             poor: fits.iter().filter(|f| f.relative >= 1.0).count(),
-            optimistic: best().filter(|b| 3 * b.terms.len() > runs).count(),
+            optimistic: best().filter(|b| 3 * b.terms.len() > self.known()).count(),
             reduction: None,
         };
         Fits {
@@ -309,9 +353,9 @@ impl Fits {
 }
 
 /// Returns the fit of an output that does not vary.
-fn constant(output: &Output) -> Fit {
-    let n = output.centred.len() as f64;
-    let residuals = output.centred.iter().map(|y| y / (1.0 - 1.0 / n)).collect();
+fn constant(output: &Output, runs: usize) -> Fit {
+    let n = runs as f64;
+    let residuals = output.centred[..runs].iter().map(|y| y / (1.0 - 1.0 / n)).collect();
     Fit { coefficients: vec![output.mean], relative: 0.0, residuals }
 }
 

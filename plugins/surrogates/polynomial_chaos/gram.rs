@@ -6,7 +6,9 @@
 
 use std::sync::OnceLock;
 
-use lacuna_linalg::{Matrix, gram, vector};
+use lacuna_linalg::{Matrix, vector};
+
+use super::columns::Columns;
 
 /// Number of terms up to which the complete matrix is computed at once: it costs next to nothing.
 const FEW: usize = 256;
@@ -28,9 +30,9 @@ impl Gram {
         terms <= FEW || (most && terms <= MANY)
     }
 
-    /// Computes all products of the columns, one column per row of `columns` (`terms x runs`).
-    pub fn whole(columns: &Matrix) -> Self {
-        Self::Whole(gram(&columns.transposed()))
+    /// Computes all products of the columns.
+    pub fn whole(columns: &Columns) -> Self {
+        Self::Whole(columns.gram())
     }
 
     /// Prepares rows for this number of terms.
@@ -39,19 +41,16 @@ impl Gram {
     }
 
     /// Returns the products of one column with all columns.
-    pub fn row<'a>(&'a self, columns: &Matrix, term: usize) -> &'a [f64] {
+    pub fn row<'a>(&'a self, columns: &Columns, term: usize) -> &'a [f64] {
         match self {
             Self::Whole(matrix) => matrix.row(term),
             // A row is a function of the columns alone, whichever thread computes it.
-            Self::Rows(rows) => rows[term].get_or_init(|| {
-                let own = columns.row(term);
-                columns.iter_rows().map(|column| vector::dot(own, column)).collect()
-            }),
+            Self::Rows(rows) => rows[term].get_or_init(|| columns.products(term)),
         }
     }
 
     /// Writes `sum_i weights[i] * row(terms[i])` to `out`.
-    pub fn combine(&self, columns: &Matrix, terms: &[usize], weights: &[f64], out: &mut [f64]) {
+    pub fn combine(&self, columns: &Columns, terms: &[usize], weights: &[f64], out: &mut [f64]) {
         match self {
             Self::Whole(matrix) => vector::combine_rows(matrix, terms, weights, out),
             Self::Rows(_) => {
@@ -66,7 +65,7 @@ impl Gram {
     /// Two combinations of the same rows.
     pub fn combine_twice(
         &self,
-        columns: &Matrix,
+        columns: &Columns,
         terms: &[usize],
         weights: [&[f64]; 2],
         out: [&mut [f64]; 2],
@@ -90,7 +89,8 @@ mod tests {
     #[test]
     fn rows_on_demand_are_those_of_the_whole_matrix() {
         let mut rng = Stream::root(4).generator();
-        let columns = Matrix::from_fn(30, 17, |_, _| normal(&mut rng));
+        let values = Matrix::from_fn(30, 17, |_, _| normal(&mut rng));
+        let columns = Columns::new(values, None);
         let (whole, rows) = (Gram::whole(&columns), Gram::rows(30));
         let terms = [3, 28, 0, 11, 7];
         let weights = [0.5, -2.0, 1.0, 3.0, -0.25];

@@ -3,6 +3,7 @@
 use lacuna::math::random::{Stream, permutation};
 use lacuna_linalg::{Cholesky, Matrix, vector};
 
+use super::by_run::ByRun;
 use super::dictionary::ActiveSet;
 use super::options::Selection;
 
@@ -17,6 +18,16 @@ pub(super) enum Criterion {
     LeaveOneOut,
     /// Cross-validation error with these groups of runs left out in turn.
     Folds(Vec<Vec<usize>>),
+    /// Error of the values at runs that are left out one after the other, each with its slopes by this number of
+    /// parameters, corrected for the number of terms.
+    ByRun {
+        /// Number of runs.
+        runs: usize,
+        /// Number of parameters.
+        dimension: usize,
+        /// Number of values and known slopes.
+        known: usize,
+    },
 }
 
 impl Criterion {
@@ -130,6 +141,8 @@ struct Judge<'a> {
     /// Sums of squares of the residuals, and of the leave-one-out residuals (the residuals divided by `freedom`).
     squares: [f64; 2],
     terms: usize,
+    /// Leave-one-run-out errors, if there are slopes, and the sum of squares of the centred values.
+    by_run: Option<(ByRun, f64)>,
 }
 
 impl<'a> Judge<'a> {
@@ -141,8 +154,15 @@ impl<'a> Judge<'a> {
             (&fold[..], Matrix::from_fn(m, m, |i, j| f64::from(u8::from(i == j)) - constant))
         };
         let folds = match criterion {
-            Criterion::LeaveOneOut => Vec::new(),
+            Criterion::LeaveOneOut | Criterion::ByRun { .. } => Vec::new(),
             Criterion::Folds(folds) => folds.iter().map(block).collect(),
+        };
+        let by_run = match *criterion {
+            Criterion::ByRun { runs, dimension, known } => {
+                let values = &centred[..runs];
+                Some((ByRun::new(runs, dimension, known), vector::dot(values, values)))
+            }
+            _ => None,
         };
         let total = vector::dot(centred, centred);
         let freedom = 1.0 - 1.0 / n as f64;
@@ -153,6 +173,7 @@ impl<'a> Judge<'a> {
             total,
             squares: [total, total / (freedom * freedom)],
             terms: 1,
+            by_run,
         }
     }
 
@@ -169,11 +190,18 @@ impl<'a> Judge<'a> {
                 row.iter_mut().zip(*runs).for_each(|(x, &b)| *x -= column[a] * column[b]);
             }
         }
+        if let Some((by_run, _)) = &mut self.by_run {
+            by_run.add(column);
+        }
     }
 
-    /// Returns the error relative to the variance; `trace` is `tr (Psi' Psi)^-1`.
-    fn error(&self, trace: f64) -> f64 {
-        let error = if self.folds.is_empty() {
+    /// Returns the error relative to the variance; `trace` is `tr (Psi' Psi)^-1`. Infinite for a set that is passed over.
+    fn error(&mut self, trace: f64) -> f64 {
+        let exact = self.exact();
+        let error = if let Some((by_run, total)) = &mut self.by_run {
+            let squares = by_run.squares(&self.residual, self.terms, trace, exact);
+            squares.map_or(f64::INFINITY, |squares| squares / *total)
+        } else if self.folds.is_empty() {
             self.squares[1] / self.total * correction(self.residual.len(), self.terms, trace)
         } else {
             let squares = self.folds.iter().map(|(runs, b)| left_out(runs, b, &self.residual));

@@ -5,6 +5,7 @@ use lacuna_linalg::{
     transposed_multiply_vector,
 };
 
+use super::by_run::Blocks;
 use super::judge::{Criterion, correction, left_out};
 
 /// Regression on a fixed set of basis functions, factored once for any number of outputs.
@@ -17,6 +18,8 @@ pub(super) struct Regression {
     correction: f64,
     /// Runs of each fold and their block of `1 - H`, with `H` the hat matrix.
     folds: Vec<(Vec<usize>, Matrix)>,
+    /// Blocks of the runs, if their slopes are among the rows.
+    by_run: Option<Blocks>,
 }
 
 /// Regression of one output.
@@ -25,12 +28,12 @@ pub(super) struct Fit {
     pub coefficients: Vec<f64>,
     /// Error by the criterion, relative to the output's variance.
     pub relative: f64,
-    /// Leave-one-out residuals `r_i / (1 - h_i)`.
+    /// Leave-one-out residuals of the values: `r_i / (1 - h_i)` without slopes.
     pub residuals: Vec<f64>,
 }
 
 impl Regression {
-    /// Factors the basis functions at the runs (`runs x terms`); `None` if they are linearly dependent to working
+    /// Factors the basis functions at the runs (`runs x terms`, with slopes `rows x terms`); `None` if they are linearly dependent to working
     /// precision.
     pub fn new(basis: &Matrix, criterion: &Criterion) -> Option<Self> {
         let (n, p) = (basis.rows(), basis.columns());
@@ -45,29 +48,39 @@ impl Regression {
         let trace = inverse.as_slice().iter().map(|x| x * x).sum();
         let leverage = qr.q.iter_rows().map(|row| row.iter().map(|x| x * x).sum()).collect();
         let folds = match criterion {
-            Criterion::LeaveOneOut => Vec::new(),
+            Criterion::LeaveOneOut | Criterion::ByRun { .. } => Vec::new(),
             Criterion::Folds(folds) => folds.iter().map(|fold| block(&qr.q, fold)).collect(),
         };
-        let correction = correction(n, p, trace);
-        Some(Self { q: qr.q, r: qr.r, leverage, correction, folds })
+        let by_run = match criterion {
+            Criterion::ByRun { runs, .. } => Some(Blocks::of(&qr.q, *runs)),
+            _ => None,
+        };
+        let known = match criterion {
+            Criterion::ByRun { known, .. } => *known,
+            _ => n,
+        };
+        let correction = correction(known, p, trace);
+        Some(Self { q: qr.q, r: qr.r, leverage, correction, folds, by_run })
     }
 
-    /// Fits one output, given as its mean and the deviations from it (`centred`); `variance` is that of its values,
-    /// with divisor `N`. The first basis function must be the constant 1: it takes the mean, so that a large mean
+    /// Fits one output, given as its mean and the deviations from it (`centred`, followed by its slopes if there are
+    /// any); `variance` is that of its values, with divisor `N`. The first basis function must be the constant 1: it takes the mean, so that a large mean
     /// costs no digits.
     pub fn fit(&self, mean: f64, centred: &[f64], variance: f64) -> Fit {
         let mut coefficients = transposed_multiply_vector(&self.q, centred);
         let model = multiply_vector(&self.q, &coefficients);
         solve_upper(&self.r, &mut coefficients);
         coefficients[0] += mean;
-        let residuals: Vec<f64> = (centred.iter().zip(&model).zip(&self.leverage))
-            .map(|((y, m), h)| (y - m) / (1.0 - h))
-            .collect();
+        let plain = || centred.iter().zip(&model).map(|(y, m)| y - m);
+        let residuals: Vec<f64> = match &self.by_run {
+            Some(blocks) => blocks.left_out(&plain().collect::<Vec<f64>>()),
+            None => plain().zip(&self.leverage).map(|(r, h)| r / (1.0 - h)).collect(),
+        };
         let relative = if self.folds.is_empty() {
-            let squares = residuals.iter().map(|r| r * r).sum::<f64>() / centred.len() as f64;
+            let squares = residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64;
             squares / variance * self.correction
         } else {
-            let plain: Vec<f64> = centred.iter().zip(&model).map(|(y, m)| y - m).collect();
+            let plain: Vec<f64> = plain().collect();
             let squares = self.folds.iter().map(|(runs, block)| left_out(runs, block, &plain));
             squares.sum::<f64>() / centred.len() as f64 / variance
         };

@@ -1,8 +1,10 @@
 //! `polynomial_chaos`: expansions in orthonormal polynomials of the parameters.
 
 mod bayesian;
+mod by_run;
 pub(super) mod bytes;
 mod candidates;
+mod columns;
 mod coordinate;
 mod dictionary;
 mod emulator;
@@ -19,6 +21,7 @@ mod quadrature;
 mod recurrence;
 mod search;
 mod sensitivity;
+mod slopes;
 mod sparse;
 mod squares;
 mod subspace_pursuit;
@@ -58,6 +61,11 @@ pub use terms::{Basis, Nested, Sets, TermSet, Terms, Truncation};
 /// smallest error; an output that varies is never represented by its mean alone. Outputs that are constant over the
 /// runs up to rounding errors are emulated by their mean and have the error 0.
 ///
+/// With `gradients = true` in `[surrogate]` each run adds the slopes by its parameters to the regression, in the standard
+/// variables and with the weights under which the slopes of the polynomials are orthogonal as well. The leave-one-out error is
+/// then that of the values at runs left out together with their slopes. The solvers `least_angle_regression`,
+/// `orthogonal_matching_pursuit` and `least_squares` take slopes.
+///
 /// Because this error was used for the choice, it is too small if there are few runs: with fewer than three runs per
 /// term or ten per parameter rely on the `validation` runs instead. The result reports when this is the case.
 ///
@@ -74,7 +82,8 @@ pub use terms::{Basis, Nested, Sets, TermSet, Terms, Truncation};
 /// log-normal parameters cannot represent). Solvers: Pati, Rezaiifar and Krishnaprasad, 27th Asilomar Conference
 /// (1993) 40; Dai and Milenkovic, IEEE Transactions on Information Theory 55 (2009) 2230; Tipping and Faul, 9th
 /// Workshop on Artificial Intelligence and Statistics (2003); Lüthen, Marelli and Sudret, SIAM/ASA Journal on
-/// Uncertainty Quantification 9 (2021) 593 (a comparison).
+/// Uncertainty Quantification 9 (2021) 593 (a comparison). Slopes: Peng, Hampton and Doostan, Journal of Computational
+/// Physics 310 (2016) 440.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PolynomialChaos {
@@ -286,6 +295,22 @@ impl Surrogate for PolynomialChaos {
         progress: &Progress<'_>,
     ) -> Result<Box<dyn Emulator>, Stop> {
         Ok(Box::new(fit::fit(self, training, stream, progress)?))
+    }
+
+    fn takes_gradients(&self) -> Result<(), String> {
+        let takes =
+            [Solver::LeastAngleRegression, Solver::OrthogonalMatchingPursuit, Solver::LeastSquares];
+        if !takes.contains(&self.solver) {
+            let names: Vec<String> = takes.map(|s| format!("`{}`", s.name())).into();
+            let (own, others) = (self.solver.name(), names.join(", "));
+            return Err(format!(
+                "its solver `{own}` is fitted to the responses alone; {others} take derivatives"
+            ));
+        }
+        if self.selection != Selection::LeaveOneOut {
+            return Err("with derivatives it leaves out one run after the other, not the groups of `k_fold`".to_owned());
+        }
+        Ok(())
     }
 
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop> {

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use lacuna::run::{Progress, Stop};
-use lacuna_linalg::{Matrix, multiply_transposed};
+use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
 use super::PolynomialChaos;
 use super::bayesian::{Parts, bayesian};
+use super::columns::Columns;
 use super::coordinate::Coordinate;
 use super::dictionary::Dictionary;
 use super::gram::Gram;
@@ -17,6 +18,7 @@ use super::least_squares::{Fit, Regression};
 use super::matching_pursuit::MatchingPursuit;
 use super::options::Solver;
 use super::quadrature::Projection;
+use super::slopes::Slopes;
 use super::subspace_pursuit::subspace_pursuit;
 use super::terms::{Basis, Sets, TermSet};
 
@@ -30,7 +32,7 @@ const WORSE_NORMS: usize = 2;
 /// Values of one output over the runs.
 pub(super) struct Output {
     pub mean: f64,
-    /// Values minus their mean.
+    /// Values minus their mean, followed by the slopes if they are known ([`Slopes`]).
     pub centred: Vec<f64>,
     /// Variance with the number of runs as divisor; zero for outputs that do not vary.
     pub variance: f64,
@@ -67,6 +69,8 @@ pub(super) struct Search<'a> {
     pub criterion: &'a Criterion,
     /// Weights of the runs, for projections.
     pub projection: Option<&'a Projection>,
+    /// Slopes among the rows of the regression.
+    pub slopes: Option<&'a Slopes>,
 }
 
 impl Search<'_> {
@@ -118,9 +122,20 @@ impl Search<'_> {
         }
     }
 
-    /// Returns the basis functions of some terms at the runs (`runs x terms`).
-    fn basis(&self, terms: &[usize]) -> Matrix {
-        Basis::new(self.coordinates.to_vec(), self.sets.terms.select(terms)).values(self.points)
+    /// Returns the basis functions of some terms.
+    fn basis(&self, terms: &[usize]) -> Basis {
+        Basis::new(self.coordinates.to_vec(), self.sets.terms.select(terms))
+    }
+
+    /// Returns the basis functions of some terms at the runs (`runs x terms`), followed by their slopes.
+    fn rows(&self, terms: &[usize]) -> Matrix {
+        let basis = self.basis(terms);
+        let values = basis.values(self.points);
+        let Some(slopes) = self.slopes else { return values };
+        let slopes = slopes.columns(&basis, self.points);
+        let columns = Columns::new(values.transposed(), Some(slopes));
+        let all = (0..columns.terms()).map(|t| columns.column(t));
+        Matrix::from_rows(columns.height(), all).transposed()
     }
 
     /// Returns the best fit of each active output on one set.
@@ -153,9 +168,12 @@ impl Search<'_> {
         // Sparse Bayesian learning follows the statistics of every term.
         let whole = self.options.solver == Solver::BayesianCompressiveSensing
             || Gram::needs_all(set.members.len(), runs, active.len());
-        let dictionary = Dictionary::new(&self.basis(&set.members), whole);
-        let centred = Matrix::from_rows(runs, active.iter().map(|&o| &outputs[o].centred));
-        let correlations = multiply_transposed(&centred, dictionary.columns());
+        let basis = self.basis(&set.members);
+        let slopes = self.slopes.map(|slopes| slopes.columns(&basis, self.points));
+        let dictionary = Dictionary::new(&basis.values(self.points), slopes, whole);
+        let rows = self.slopes.map_or(runs, |slopes| runs * (1 + slopes.dimension()));
+        let centred = Matrix::from_rows(rows, active.iter().map(|&o| &outputs[o].centred));
+        let correlations = dictionary.correlations(&centred);
         let parts = Parts::default();
         let best = |i: usize| {
             let choice = self.choose(&dictionary, &parts, centred.row(i), correlations.row(i))?;
@@ -176,7 +194,7 @@ impl Search<'_> {
         correlations: &[f64],
     ) -> Option<Choice> {
         let criterion = self.criterion;
-        let window = self.options.early_stop.window(centred.len());
+        let window = self.options.early_stop.window(self.points.rows());
         match self.options.solver {
             Solver::OrthogonalMatchingPursuit => {
                 let mut path = MatchingPursuit::new(dictionary, correlations);
@@ -221,7 +239,7 @@ impl Search<'_> {
 
     /// Fits some outputs on the same terms.
     fn fits(&self, terms: &[usize], outputs: &[Output], which: &[usize]) -> Result<Vec<Fit>, Stop> {
-        let basis = self.basis(terms);
+        let basis = self.rows(terms);
         if let Some(projection) = self.projection {
             let projected = projection.on(&basis);
             return Ok(which.par_iter().map(|&o| projected.fit(&outputs[o])).collect());

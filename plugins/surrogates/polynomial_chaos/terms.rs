@@ -276,16 +276,23 @@ impl Basis {
     /// Returns the derivative of each basis function (rows) with respect to each parameter (columns), in physical
     /// units.
     pub fn gradient(&self, point: &[f64]) -> Matrix {
+        let pairs = self.coordinates.iter().zip(point);
+        let stretches: Vec<f64> = pairs.map(|(coordinate, &x)| coordinate.stretch(x)).collect();
+        let mut gradient = Matrix::zeros(self.terms.len(), self.coordinates.len());
+        self.slopes(point, |t, i, slope| gradient[(t, i)] = slope / stretches[i]);
+        gradient
+    }
+
+    /// Calls `take` with each basis function, each parameter that it depends on, and its derivative with respect to the
+    /// standard variable of the parameter: function by function, in the order of the parameters.
+    pub(super) fn slopes(&self, point: &[f64], mut take: impl FnMut(usize, usize, f64)) {
         let mut table = vec![0.0; self.coordinates.len() * self.stride];
         let mut slopes = table.clone();
-        let mut stretches = Vec::with_capacity(self.coordinates.len());
         for (i, coordinate) in self.coordinates.iter().enumerate() {
             let range = i * self.stride..(i + 1) * self.stride;
             let z = coordinate.standard(point[i]);
             coordinate.derivatives(z, &mut table[range.clone()], &mut slopes[range]);
-            stretches.push(coordinate.stretch(point[i]));
         }
-        let mut gradient = Matrix::zeros(self.terms.len(), self.coordinates.len());
         for t in 0..self.terms.len() {
             let factors = self.factors(t);
             for (k, &f) in factors.iter().enumerate() {
@@ -293,11 +300,9 @@ impl Basis {
                     .filter(|(l, _)| *l != k)
                     .map(|(_, &g)| table[g as usize])
                     .product();
-                let i = f as usize / self.stride;
-                gradient[(t, i)] = slopes[f as usize] * others / stretches[i];
+                take(t, f as usize / self.stride, slopes[f as usize] * others);
             }
         }
-        gradient
     }
 }
 

@@ -119,7 +119,7 @@ impl PolynomialChaosKriging {
         if scores.columns() == 0 {
             return Ok(Trends { regressors: Regressors::Constant, candidates: Vec::new() });
         }
-        let of_scores = Training { responses: scores, ..*training };
+        let of_scores = Training { responses: scores, gradients: None, ..*training };
         let expansion =
             self.trend.expand(&of_scores, &stream.named("trend"), &Progress::new(&Silent))?;
         let candidates = (0..scores.columns())

@@ -102,7 +102,13 @@ impl<T: Surrogate + Authored> ServeSurrogate for Plugin<T> {
         let progress = Object::new(progress.progress, functions, None, fault);
         let told = Told { progress, said: AtomicU64::new(0) };
         let TrainingAbout { parameters, layouts } = &about;
-        let runs = Training { parameters, layouts, points: &points, responses: &responses };
+        let runs = Training {
+            parameters,
+            layouts,
+            points: &points,
+            responses: &responses,
+            gradients: None,
+        };
         let emulator = self.0.fit(&runs, &key, &Progress::new(&told))?;
         // SAFETY: the caller gives a place for one emulator.
         unsafe { made.put(handed(emulator)) };

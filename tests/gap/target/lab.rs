@@ -67,7 +67,7 @@ fn fitted(parameters: &[Parameter], points: &Matrix, responses: &Matrix) -> Box<
     let layouts = layouts();
     let options = "degree = { max = 10 }\nq_norm = 0.75";
     let surrogate = registry::from_text::<dyn Surrogate>("polynomial_chaos", options).unwrap();
-    let training = Training { parameters, layouts: &layouts, points, responses };
+    let training = Training { parameters, layouts: &layouts, points, responses, gradients: None };
     surrogate.plugin.fit(&training, &Stream::root(2), &Progress::new(&Silent)).unwrap()
 }
 

@@ -117,6 +117,7 @@ fn fit(
         layouts: &layout.into(),
         points: &points,
         responses: &responses,
+        gradients: None,
     };
     let progress = Progress::new(&Silent);
     let (emulator, seconds) = timed(|| options.fit(&training, &Stream::root(3), &progress))?;

@@ -100,6 +100,7 @@ impl<W: World> Emulated<W> {
             layouts: &layouts,
             points: &points,
             responses: &responses,
+            gradients: None,
         };
         let fitted = surrogate.plugin.fit(&training, &Stream::root(2), &Progress::new(&Silent));
         let emulator = fitted?;

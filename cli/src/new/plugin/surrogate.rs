@@ -274,7 +274,13 @@ mod tests {
         let parameters =
             ["a", "b"].map(|name| Parameter::plain(name, Distribution::Uniform([0.0, 1.0])));
         let layouts = Layout::number("y").into();
-        let training = Training { parameters: &parameters, layouts: &layouts, points, responses };
+        let training = Training {
+            parameters: &parameters,
+            layouts: &layouts,
+            points,
+            responses,
+            gradients: None,
+        };
         let (stream, progress) = (Stream::root(1), Progress::new(&Silent));
         Skeleton { degree: 2 }.fit(&training, &stream, &progress).unwrap()
     }

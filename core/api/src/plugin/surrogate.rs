@@ -18,6 +18,14 @@ pub trait Surrogate: Component {
         progress: &Progress<'_>,
     ) -> Result<Box<dyn Emulator>, Stop>;
 
+    /// Accepts or refuses [`Training::gradients`].
+    ///
+    /// # Errors
+    /// The reason why it does not, as a clause such as `it is fitted to the responses alone`.
+    fn takes_gradients(&self) -> Result<(), String> {
+        Err("it is fitted to the responses alone".to_owned())
+    }
+
     /// Restores an emulator from the bytes that [`Emulator::save`] wrote.
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop>;
 
@@ -55,6 +63,10 @@ pub struct Training<'a> {
     pub points: &'a Matrix,
     /// Responses, `runs x outputs`.
     pub responses: &'a Matrix,
+    /// Derivatives of the responses by the parameters, in physical units: those of the first output by all parameters,
+    /// then those of the second, `runs x (outputs * parameters)`; NaN where they are not known. `None` unless the study
+    /// requests them and [`Surrogate::takes_gradients`].
+    pub gradients: Option<&'a Matrix>,
 }
 
 /// A fitted surrogate. Points are in physical units, one per row.

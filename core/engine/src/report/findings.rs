@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::assess::Assessment;
-use crate::screening::Screening;
+use crate::screening::{ActiveSubspace, Screening};
 
 pub use crate::gap::result::GapFindings;
 use crate::stage::calibrate::PopulationOutcome;
@@ -90,6 +90,8 @@ pub struct EnsembleFindings {
     pub in_prior: usize,
     /// Effects of the inputs as far as the runs show them, one entry per input.
     pub screening: Option<Screening>,
+    /// Directions of the inputs in which the response changes, if the derivatives at the runs are known.
+    pub active: Option<ActiveSubspace>,
 }
 
 /// An input that the runs vary: a parameter, or one of which each group has its own value in the calibration.

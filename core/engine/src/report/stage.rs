@@ -87,9 +87,9 @@ fn findings(
         fields: fields(study, calibrated),
         prior: study.prior_facts(),
         layouts: study.layouts.clone(),
-        ensemble: all
-            .problem
-            .and_then(|problem| Some(ensemble(study, problem.data.value.ensemble.as_ref()?))),
+        ensemble: all.problem.and_then(|problem| {
+            Some(ensemble(study, problem, problem.data.value.ensemble.as_ref()?))
+        }),
         measured: measured.map(|m| measurements(study, m)),
         surrogate: all.problem.and_then(|problem| surrogate(problem, all.validated)),
         warnings: {
@@ -124,7 +124,9 @@ fn components(study: &Study) -> Vec<(String, String)> {
     chosen.map(|chosen| (chosen.section.to_owned(), chosen.name.to_owned())).collect()
 }
 
-fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
+fn ensemble(study: &Study, problem: &InverseProblem<'_>, e: &Ensemble) -> EnsembleFindings {
+    let follows = follows_data(study);
+    let active = problem.fitted().and_then(|fitted| fitted.value.active.clone());
     let inside = |point: &&[f64]| study.prior().allows(point);
     EnsembleFindings {
         points: e.points.clone(),
@@ -132,17 +134,19 @@ fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
         valid: e.valid.clone(),
         failed: e.failed.clone(),
         in_prior: e.points.iter_rows().filter(inside).count(),
-        screening: screening(study, e),
+        screening: if follows { None } else { screening(study, e) },
+        active: active.filter(|_| !follows),
     }
 }
 
-/// Effects of the inputs as far as the runs show them; `None` if there are too few runs, or if some follow the data, where the
-/// inputs depend on each other.
+/// True if some runs follow the data: the inputs then depend on each other.
+fn follows_data(study: &Study) -> bool {
+    study.surrogate.as_ref().is_some_and(|s| s.common.refine.is_some())
+        || study.design.as_ref().is_some_and(|d| d.built.plugin.is_sequential())
+}
+
+/// Effects of the inputs as far as the runs show them; `None` if there are too few runs.
 fn screening(study: &Study, e: &Ensemble) -> Option<Screening> {
-    let refined = study.surrogate.as_ref().is_some_and(|s| s.common.refine.is_some());
-    if refined || study.design.as_ref().is_some_and(|d| d.built.plugin.is_sequential()) {
-        return None;
-    }
     let designs = study.trained().parameters.iter().map(|p| &p.design);
     let column = |input: &RunInput| input.places.first().copied();
     let columns: Vec<usize> = inputs(study).iter().map(column).collect::<Option<_>>()?;

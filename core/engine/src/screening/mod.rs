@@ -5,9 +5,11 @@
 //!   Cariboni and Saltelli, Environmental Modelling and Software 22 (2007) 1509).
 //! - Otherwise: the **Hilbert-Schmidt independence criterion** of each input and the response, with the p-value of a
 //!   test of independence (Gretton et al., Advances in Neural Information Processing Systems 20 (2008) 585).
+//! - If the derivatives at the runs are known, the [active subspace](ActiveSubspace) as well.
 
 mod criterion;
 mod effects;
+mod subspace;
 #[cfg(test)]
 mod tests;
 
@@ -17,6 +19,7 @@ use lacuna_linalg::Matrix;
 
 pub use self::criterion::Dependence;
 pub use self::effects::ElementaryEffects;
+pub use self::subspace::{ActiveSubspace, active_subspace};
 
 /// Level of the test of independence.
 pub const LEVEL: f64 = 0.05;
@@ -94,4 +97,25 @@ fn scaled(responses: &Matrix, blocks: impl Iterator<Item = Range<usize>>) -> Opt
     let size = f64::sqrt(varying);
     scaled.as_mut_slice().iter_mut().for_each(|y| *y /= size.max(1.0));
     (varying > 0.0).then_some(scaled)
+}
+
+/// Factor of each output by which [`scaled`] multiplies its deviations from the mean; zero for blocks that do not vary.
+fn scales(responses: &Matrix, blocks: impl Iterator<Item = Range<usize>>) -> Option<Vec<f64>> {
+    let runs = responses.rows() as f64;
+    let mut scales = vec![0.0; responses.columns()];
+    let mut varying = 0.0;
+    for block in blocks {
+        let of = |j: usize| {
+            let values = responses.column(j);
+            let mean = values.iter().sum::<f64>() / runs;
+            values.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / runs
+        };
+        let variance: f64 = block.clone().map(of).sum();
+        if variance > 0.0 && variance.is_finite() {
+            varying += 1.0;
+            scales[block].fill(variance.sqrt().recip());
+        }
+    }
+    let size = f64::sqrt(varying).max(1.0);
+    (varying > 0.0).then(|| scales.into_iter().map(|scale| scale / size).collect())
 }

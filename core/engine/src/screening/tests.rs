@@ -1,11 +1,11 @@
 #![allow(clippy::unwrap_used)]
 use std::f64::consts::PI;
 
-use lacuna::math::random::{Stream, below, permutation, uniform};
+use lacuna::math::random::{Stream, below, normal, permutation, uniform};
 use lacuna_linalg::Matrix;
 
 use super::criterion::dependences;
-use super::{ElementaryEffects, LEVEL, Screening, screen};
+use super::{ElementaryEffects, LEVEL, Screening, active_subspace, screen};
 
 fn cube(runs: usize, inputs: usize, stream: &Stream) -> Matrix {
     let mut rng = stream.generator();
@@ -166,4 +166,56 @@ fn what_cannot_be_screened_has_no_result() {
     let still = Matrix::from_fn(50, 2, |i, j| if j == 0 { points[(i, 0)] } else { 0.5 });
     let found = screened(&still, &values(&points, |x| x[0]));
     assert_eq!(found.acts(), [true, false]);
+}
+
+/// The gradient of a sine of `w'x` is a multiple of `w`: one eigenvalue is not zero, and the inputs share it like the squares of
+/// the components of `w` times the widths.
+#[test]
+fn a_ridge_has_one_direction() {
+    let (weights, widths) = ([1.0, -2.0, 0.5], [1.0, 0.5, 4.0]);
+    let mut rng = Stream::root(6).generator();
+    let points = Matrix::from_fn(40, 3, |_, _| uniform(&mut rng));
+    let along = |x: &[f64]| x.iter().zip(&weights).map(|(x, w)| x * w).sum::<f64>();
+    let responses = values(&points, |x| along(x).sin());
+    let mut gradients = Matrix::from_fn(40, 3, |i, j| along(points.row(i)).cos() * weights[j]);
+    gradients.row_mut(7).fill(f64::NAN);
+    let blocks = || std::iter::once(0..1);
+    let found = active_subspace(&gradients, &widths, &responses, blocks(), &Stream::root(1));
+    let found = found.unwrap();
+    assert_eq!((found.runs, found.directions(0.99)), (39, 1));
+    assert!(found.eigenvalues[1] < 1e-14 * found.eigenvalues[0]);
+    for (j, share) in [1.0, 1.0, 4.0].into_iter().enumerate() {
+        assert!((found.activity[j] / found.eigenvalues[0] - share / 6.0).abs() < 1e-12);
+    }
+    let unknown = Matrix::from_fn(40, 3, |_, _| f64::NAN);
+    assert_eq!(active_subspace(&unknown, &widths, &responses, blocks(), &Stream::root(1)), None);
+}
+
+/// With normal inputs the gradient of `x'Ax / 2` has the mean outer product `A^2`. Intervals of 100 resampled runs are known
+/// to be a little too narrow: they hold the eigenvalue in nine of ten cases or more, where the nominal share is 95 %.
+#[test]
+fn eigenvalues_of_gradients_have_their_spread() {
+    let slopes = [3.0, 1.5, 0.5];
+    let cases = 300;
+    let mut inside = [0; 3];
+    for case in 0..cases {
+        let mut rng = Stream::root(case).generator();
+        let points = Matrix::from_fn(100, 3, |_, _| normal(&mut rng));
+        let responses =
+            values(&points, |x| 0.5 * x.iter().zip(&slopes).map(|(x, a)| a * x * x).sum::<f64>());
+        let gradients = Matrix::from_fn(100, 3, |i, j| slopes[j] * points[(i, j)]);
+        let blocks = std::iter::once(0..1);
+        let stream = Stream::root(case).named("resampled");
+        let found = active_subspace(&gradients, &[1.0; 3], &responses, blocks, &stream).unwrap();
+        let mean = responses.as_slice().iter().sum::<f64>() / 100.0;
+        let variance = responses.as_slice().iter().map(|y| (y - mean).powi(2)).sum::<f64>() / 100.0;
+        for (i, (low, high)) in found.spread.iter().enumerate() {
+            let truth = slopes[i] * slopes[i] / variance;
+            inside[i] += usize::from(*low <= truth && truth <= *high);
+        }
+    }
+    println!("inside of {cases}: {inside:?}");
+    // The Monte Carlo error of a share of 0.92 in 300 cases is 0.016.
+    let share = inside.map(|count| count as f64 / cases as f64);
+    assert!(share.iter().all(|share| (0.87..=0.985).contains(share)), "{share:?}");
 }

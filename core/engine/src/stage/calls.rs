@@ -1,5 +1,6 @@
-//! Slow evaluations of a model that takes the place of an emulator, kept in the run directory: an interrupted stage, later
-//! stages and a study that asks for something else find them again.
+//! Evaluations of a model beside those of the design, kept in the run directory: an interrupted stage, later stages and a
+//! study that asks for something else find them again. Of a model that takes the place of an emulator the slow ones are
+//! kept; of derivatives at the runs of a design all.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -11,12 +12,14 @@ use std::time::Duration;
 use lacuna::run::{Stop, files};
 use serde::{Deserialize, Serialize};
 
-/// Evaluations that take less time are repeated.
+/// Evaluations that take less time are repeated, unless all are kept.
 const SLOW: Duration = Duration::from_secs(1);
 
 /// Kept evaluations of a model.
 pub struct Calls {
     path: PathBuf,
+    /// Evaluations that take less time are not kept.
+    least: Duration,
     known: Mutex<Known>,
 }
 
@@ -45,13 +48,22 @@ fn key(scenario: usize, inputs: &[f64]) -> (usize, Vec<u64>) {
 impl Calls {
     /// The evaluations in a file, which need not exist. A line that was cut by the end of the process is ignored.
     pub fn open(path: PathBuf) -> Self {
+        Self::with(path, SLOW)
+    }
+
+    /// Like [`Calls::open`]; all evaluations are kept.
+    pub fn of_all(path: PathBuf) -> Self {
+        Self::with(path, Duration::ZERO)
+    }
+
+    fn with(path: PathBuf, least: Duration) -> Self {
         let text = fs::read(&path).unwrap_or_default();
         let lines = text.split(|byte| *byte == b'\n');
         let responses = lines
             .filter_map(|line| serde_json::from_slice::<Line>(line).ok())
             .map(|line| (key(line.scenario, &line.inputs), line.response))
             .collect();
-        Self { path, known: Mutex::new(Known { responses, file: None }) }
+        Self { path, least, known: Mutex::new(Known { responses, file: None }) }
     }
 
     /// The response to a scenario for some inputs, if it is known.
@@ -75,7 +87,7 @@ impl Calls {
         response: &[f64],
         taken: Duration,
     ) -> Result<(), Stop> {
-        if taken < SLOW {
+        if taken < self.least {
             return Ok(());
         }
         let Ok(mut known) = self.known.lock() else { return Ok(()) };

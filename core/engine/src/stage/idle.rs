@@ -49,6 +49,11 @@ impl Used {
         Self { indices: (0..of).collect(), of }
     }
 
+    /// Indices of the used parameters.
+    pub fn indices(&self) -> &[usize] {
+        &self.indices
+    }
+
     /// Selects the used parameters.
     pub fn parameters(&self, all: &[Parameter]) -> Vec<Parameter> {
         self.indices.iter().map(|&i| all[i].clone()).collect()

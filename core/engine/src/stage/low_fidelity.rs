@@ -126,7 +126,8 @@ pub fn fit(
     let (Some(low), Some((points, responses))) = (&study.low_fidelity, cheap) else {
         return own.fit(runs, &random, progress);
     };
-    let training = Training { parameters, layouts: runs.layouts, points, responses };
+    let training =
+        Training { parameters, layouts: runs.layouts, points, responses, gradients: None };
     let emulator = own.fit(&training, &random, progress)?;
     let (cheap, predicted) = at(&*emulator, points, responses, runs.points);
     let (plugin, _) = of_difference(study, low).ok_or_else(no_surrogate)?;

@@ -16,6 +16,7 @@ pub mod emulator_error;
 pub mod evidence;
 pub mod fidelity;
 pub mod fields;
+pub mod gradients;
 pub mod grouped;
 pub mod idle;
 pub mod imports;

@@ -15,7 +15,7 @@ use lacuna::plugin::{Context, Given};
 use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, multiply};
 
-use asked::{asked, folder};
+use asked::{asked, folder, shaped};
 
 use crate::study::Study;
 use crate::study::file::ModelKeys;
@@ -235,6 +235,7 @@ impl<'a> Simulator<'a> {
     ) -> Result<Matrix, EvalError> {
         let inputs = setting.inputs(point);
         let jacobian = gradient.jacobian(&self.call(setting, &inputs))?;
+        shaped(&jacobian, setting.asked.len(), inputs.len())?;
         Ok(setting.by_parameters(&jacobian, point))
     }
 

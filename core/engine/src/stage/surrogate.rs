@@ -12,10 +12,12 @@ use serde_json::json;
 
 pub use self::fitted::{Errors, Fitted};
 use super::emulator_error::{self, Curves};
+use super::gradients::{self, Gradients};
 use super::idle::Used;
 use super::more_runs::is_inside;
 use super::read::Data;
 use super::{low_fidelity, stream};
+use crate::screening::{ActiveSubspace, active_subspace};
 use crate::study::Study;
 use crate::study::file::InvalidRuns;
 
@@ -145,10 +147,16 @@ pub fn stage(
         Some(identity) => json!([inputs, { "low_fidelity": identity }]),
         None => inputs,
     };
+    let slopes = gradients::stage(study, &data.value, fitting, run, observer)?;
+    let inputs = match &slopes {
+        Some(kept) => json!([inputs, { "gradients": kept.hash }]),
+        None => inputs,
+    };
     let ensemble = data.value.runs()?;
     observer.begin(purpose.label(), "output", ensemble.layouts.len() as u64);
     let kept = run.keep(&fitting.folder, &inputs, observer, |_| {
-        fit(study, &data.value, fitting, &used, observer)
+        let gradients = slopes.as_ref().map(|kept| &kept.value);
+        fit(Fit { study, data: &data.value, fitting, used: &used, gradients }, observer)
     })?;
     let emulator = used.widen(purpose.load(study, &kept.value.bytes)?);
     let errors = &kept.value.errors;
@@ -182,17 +190,11 @@ fn split(study: &Study, ensemble: &Ensemble) -> Result<(usize, usize), Stop> {
     Ok((training, validation))
 }
 
-fn fit(
-    study: &Study,
-    data: &Data,
-    fitting: &Fitting<'_>,
-    used: &Used,
-    observer: &dyn Observer,
-) -> Result<Fitted, Stop> {
+fn fit(fit: Fit<'_>, observer: &dyn Observer) -> Result<Fitted, Stop> {
+    let Fit { study, data, fitting, .. } = fit;
     let ensemble = data.runs()?;
     let points = ensemble.points.select_rows(&fitting.training);
     let responses = ensemble.responses.select_rows(&fitting.training);
-    let fit = Fit { study, data, fitting, used };
     let rows: Vec<usize> = (0..points.rows()).collect();
     let emulator = fit.emulator(&points, &responses, &rows, &[], observer)?;
     let test_points = ensemble.points.select_rows(&fitting.validation);
@@ -238,7 +240,8 @@ fn fit(
     let curves = curves.with(validated);
     let samples = stacked(&left_out, &held_out);
     let sample_points = stacked(&points, &test_points);
-    Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points, curves })
+    let active = fit.active(&responses);
+    Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points, curves, active })
 }
 
 /// Runs and settings to which an emulator of the study is fitted.
@@ -247,9 +250,25 @@ struct Fit<'a> {
     data: &'a Data,
     fitting: &'a Fitting<'a>,
     used: &'a Used,
+    /// Derivatives at the training runs, if the surrogate is fitted to them too.
+    gradients: Option<&'a Gradients>,
 }
 
 impl Fit<'_> {
+    /// The active subspace of the training runs, if their derivatives are known.
+    fn active(&self, responses: &Matrix) -> Option<ActiveSubspace> {
+        let width = |parameter: &Parameter| {
+            let (design, sd) = (&parameter.design, parameter.design.sd());
+            // Laws without variance have a width all the same.
+            let middle = || 0.5 * (design.quantile(0.841) - design.quantile(0.159));
+            if sd.is_finite() { sd } else { middle() }
+        };
+        let widths: Vec<f64> = self.fitting.parameters.iter().map(width).collect();
+        let stream = stream(self.study, "gradients").named("resampled");
+        let blocks = self.study.layouts.ranges();
+        active_subspace(&self.gradients?.slopes, &widths, responses, blocks, &stream)
+    }
+
     /// Fits the emulator to some of these runs. Cheaper runs at the parameters of the left-out runs are left out too.
     fn emulator(
         &self,
@@ -259,12 +278,14 @@ impl Fit<'_> {
         left: &[usize],
         observer: &dyn Observer,
     ) -> Result<Box<dyn Emulator>, Stop> {
-        let Self { study, data, fitting, used } = *self;
+        let Self { study, data, fitting, used, gradients } = *self;
+        let gradients = gradients.map(|all| all.by(used.indices()).select_rows(kept));
         let runs = Training {
             parameters: &used.parameters(fitting.parameters),
             layouts: &study.layouts,
             points: &used.points(&points.select_rows(kept)),
             responses: &responses.select_rows(kept),
+            gradients: gradients.as_ref(),
         };
         let progress = Progress::new(observer);
         if let Purpose::Gap(name) = fitting.purpose {

@@ -4,6 +4,7 @@ mod companion;
 mod cut;
 mod effects;
 mod gap;
+pub(super) mod gradients;
 mod inputs;
 mod inside;
 mod more_runs;
@@ -48,6 +49,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     more_runs::refinement(study, &mut complaints);
     more_runs::sequential(study, &mut complaints);
     stochastic::check(study, &mut complaints);
+    gradients::check(study, &mut complaints);
     cut::check(study, &mut complaints);
     validation(study, &mut complaints);
     if let Some(model) = &study.model {

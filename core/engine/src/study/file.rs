@@ -241,6 +241,12 @@ pub struct SurrogateKeys {
     pub validation: usize,
     /// Treatment of runs that the model reports as outside its range of validity.
     pub invalid_runs: InvalidRuns,
+    /// `true` asks the model for the derivatives of its response by the parameters at every training run, and fits the
+    /// surrogate to values and derivatives: far fewer runs are then needed, above all with many parameters. The model must
+    /// give derivatives, and the surrogate must take them. One derivative is compared with differences first, for two model
+    /// runs more; a wrong one stops the study.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub gradients: bool,
     /// Sequential refinement: further runs after the calibration, placed where the posterior density and the emulator's
     /// error are large. Default: no refinement.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -9,7 +9,7 @@ use lacuna::data::{Layout, Scenario};
 use lacuna::plugin::Context;
 use lacuna::plugin::registry::loaded::declaring;
 use lacuna::text::decode::decode;
-use lacuna::text::{Node, Problems, Sources, Value};
+use lacuna::text::{Complaints, Node, Problems, Sources, Value};
 use toml::Table;
 
 use super::dependence::{Sections, dependence};
@@ -284,6 +284,7 @@ fn companion_of(study: &Study, node: &Node, problems: &mut Problems) -> Option<C
 fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems) {
     if purpose != Use::Look {
         sizes::environment(study, root, problems);
+        context::gradients::of_model(study, &mut Complaints::new(root, problems));
     }
     let measured: Vec<Scenario> =
         study.scenarios.iter().filter(|scenario| !scenario.unmeasured).cloned().collect();

@@ -92,7 +92,9 @@ fn needs(study: &Study) -> Vec<Need> {
     let parameters = study.parameters.len() as f64;
     let outputs = study.layouts.len() as f64;
     // The responses of a run, its parameters, and the response once more where the ensemble is read.
-    let run = parameters + 2.0 * outputs;
+    let derived = study.surrogate.as_ref().is_some_and(|section| section.common.gradients);
+    let slopes = if derived { 2.0 * outputs * parameters } else { 0.0 };
+    let run = parameters + 2.0 * outputs + slopes;
     if let Some(design) = &study.design {
         add("design.runs", "the runs", design.common.runs.get(), run);
         for (i, more) in design.common.extended.iter().enumerate() {

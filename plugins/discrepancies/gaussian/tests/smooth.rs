@@ -65,6 +65,7 @@ fn emulator() -> Box<dyn Emulator> {
         layouts: &layout().into(),
         points: &runs,
         responses: &responses,
+        gradients: None,
     };
     options.fit(&training, &Stream::root(2), &Progress::new(&Silent)).unwrap()
 }

@@ -181,7 +181,7 @@ pub fn fitted_to(
     responses: &Matrix,
 ) -> Result<Expansion, Stop> {
     let layouts = layout(responses.columns()).into();
-    let training = Training { parameters, layouts: &layouts, points, responses };
+    let training = Training { parameters, layouts: &layouts, points, responses, gradients: None };
     fit::fit(options, &training, &Stream::root(1), &Progress::new(&Silent))
 }
 

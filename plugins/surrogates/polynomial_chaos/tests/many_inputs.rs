@@ -18,7 +18,7 @@ use crate::surrogates::gaussian_process::GaussianProcess;
 use crate::surrogates::polynomial_chaos::{PolynomialChaos, QNorm, Selection};
 
 /// Runs of a function, and new points with its values.
-struct Case {
+pub struct Case {
     parameters: Vec<Parameter>,
     points: Matrix,
     responses: Matrix,
@@ -27,7 +27,7 @@ struct Case {
 }
 
 impl Case {
-    fn new(function: &Function, runs: usize, seed: u64) -> Self {
+    pub fn new(function: &Function, runs: usize, seed: u64) -> Self {
         let parameters: Vec<Parameter> = (function.designs.iter().enumerate())
             .map(|(i, design)| Parameter::plain(&format!("x{}", i + 1), design.clone()))
             .collect();
@@ -48,24 +48,53 @@ impl Case {
     }
 
     fn fit(&self, surrogate: &dyn Surrogate) -> Box<dyn Emulator> {
+        self.fit_to(surrogate, None)
+    }
+
+    /// Fits a surrogate to the values and these derivatives.
+    pub fn fit_to(
+        &self,
+        surrogate: &dyn Surrogate,
+        gradients: Option<&Matrix>,
+    ) -> Box<dyn Emulator> {
         let layouts = Layout::number("y").into();
         let training = Training {
             parameters: &self.parameters,
             layouts: &layouts,
             points: &self.points,
             responses: &self.responses,
+            gradients,
         };
         let stream = Stream::root(3).named("surrogate");
         surrogate.fit(&training, &stream, &Progress::new(&Silent)).unwrap()
     }
 
     /// Mean square error at the new points divided by the variance.
-    fn error(&self, emulator: &dyn Emulator) -> f64 {
+    pub fn error(&self, emulator: &dyn Emulator) -> f64 {
         let (found, truth) = (emulator.mean(&self.fresh), self.truth.as_slice());
         let mean = truth.iter().sum::<f64>() / truth.len() as f64;
         let error: f64 = found.as_slice().iter().zip(truth).map(|(a, b)| (a - b).powi(2)).sum();
         error / truth.iter().map(|y| (y - mean).powi(2)).sum::<f64>()
     }
+}
+
+/// Derivatives of a function at the runs of a case by central differences of the fourth order: with steps of a thousandth
+/// of the scale of an input, the error of the formula is about 1e-13 of the scale of the function.
+pub fn slopes(function: &Function, case: &Case) -> Matrix {
+    let step = |j: usize| {
+        1e-3 * match function.designs[j] {
+            Distribution::Uniform([low, high]) => 0.5 * (high - low),
+            _ => 1.0,
+        }
+    };
+    Matrix::from_fn(case.points.rows(), function.designs.len(), |i, j| {
+        let at = |steps: f64| {
+            let mut moved = case.points.row(i).to_vec();
+            moved[j] += steps * step(j);
+            (function.value)(&moved)
+        };
+        (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step(j))
+    })
 }
 
 /// The function of Welch et al. (1992) is a short polynomial but for one quotient; the paper's kriging has a root
@@ -92,7 +121,7 @@ fn a_hundred_inputs_have_products_of_two_by_default() {
 }
 
 /// The functions of the tables and the numbers of runs.
-fn cases() -> [(Function, &'static [usize]); 6] {
+pub fn cases() -> [(Function, &'static [usize]); 6] {
     [
         (borehole(), &[20, 100, 300]),
         (welch(), &[100, 200, 500]),

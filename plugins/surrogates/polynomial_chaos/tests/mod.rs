@@ -7,6 +7,7 @@ mod bench;
 mod components;
 mod families;
 mod functions;
+mod gradients;
 mod laws;
 mod many_inputs;
 mod options;

@@ -258,7 +258,7 @@ fn terms_enter_in_the_order_of_the_explicit_path_when_there_are_more_terms_than_
         .flat_map(|p| (0..=p).flat_map(move |j| (0..=j).map(move |k| vec![p - j, j - k, k])))
         .collect();
     let psi = basis(&exponents, &unit);
-    let dictionary = Dictionary::new(&Matrix::from_rows(exponents.len(), &psi), false);
+    let dictionary = Dictionary::new(&Matrix::from_rows(exponents.len(), &psi), None, false);
     for seed in 0..3 {
         // A dense sum of all terms, so that many enter before the best fit.
         let mut rng = Stream::root(seed).generator();
@@ -308,7 +308,7 @@ fn matching_pursuit_follows_the_explicit_one() {
     let all: Vec<Vec<u16>> =
         (0..8_u16).flat_map(|p| (0..=p).map(move |j| vec![p - j, j])).collect();
     let psi = basis(&all, &unit);
-    let dictionary = Dictionary::new(&Matrix::from_rows(all.len(), &psi), true);
+    let dictionary = Dictionary::new(&Matrix::from_rows(all.len(), &psi), None, true);
     for o in 0..3 {
         let y = responses.column(o);
         let mean = y.iter().sum::<f64>() / 60.0;
@@ -334,7 +334,7 @@ fn bayesian_sensing_ends_at_a_maximum_of_the_marginal_likelihood() {
     let all: Vec<Vec<u16>> =
         (0..5_u16).flat_map(|p| (0..=p).map(move |j| vec![p - j, j])).collect();
     let psi = basis(&all, &unit);
-    let dictionary = Dictionary::new(&Matrix::from_rows(all.len(), &psi), true);
+    let dictionary = Dictionary::new(&Matrix::from_rows(all.len(), &psi), None, true);
     let y = responses.column(2);
     let mean = y.iter().sum::<f64>() / 40.0;
     let centred: Vec<f64> = y.iter().map(|v| v - mean).collect();

@@ -6,13 +6,68 @@ use crate::page::number::significant;
 use crate::page::table::Table;
 use crate::page::{Caption, Numbers, paragraph};
 use crate::report::findings::EnsembleFindings;
-use crate::screening::Screening;
+use crate::screening::{ActiveSubspace, Screening};
 
 /// Largest number of inputs that a sentence names.
 const MOST_NAMED: usize = 12;
 
-/// Table of the screening and the inputs without effect; nothing if the runs were not screened.
+/// Tables of the screening with the inputs without effect, and of the active subspace, as far as there are any.
 pub fn part(ensemble: &EnsembleFindings, numbers: &mut Numbers) -> Markup {
+    html! {
+        (screened(ensemble, numbers))
+        @if let Some(found) = &ensemble.active { (directions(found, ensemble, numbers)) }
+    }
+}
+
+/// Largest number of eigenvalues that are listed.
+const MOST_LISTED: usize = 10;
+
+/// The eigenvalues of the active subspace, beside the inputs along which the response changes most.
+fn directions(
+    found: &ActiveSubspace,
+    ensemble: &EnsembleFindings,
+    numbers: &mut Numbers,
+) -> Markup {
+    let mut table =
+        Table::new(&["direction"], &["eigenvalue", "lower", "upper", "share up to here"]);
+    let total: f64 = found.eigenvalues.iter().sum();
+    let mut sum = 0.0;
+    let pairs = found.eigenvalues.iter().zip(&found.spread).enumerate();
+    for (i, (value, (lower, upper))) in pairs.take(MOST_LISTED) {
+        sum += value;
+        let cells = [*value, *lower, *upper].map(|x| significant(x, 3));
+        let name = (i + 1).to_string();
+        table.row([name].into_iter().chain(cells).chain([significant(sum / total, 4)]));
+    }
+    let caption = Caption::new(
+        "Directions of the inputs in which the response changes (active subspace), from the derivatives at the runs: \
+         mean square slope along each, and the central 95 % of it over resampled runs.",
+        "inputs in standard deviations of the design, and all outputs together in theirs over the runs.",
+        "few directions with nearly the whole share: the response depends on as many combinations of the inputs.",
+    );
+    let mut order: Vec<usize> = (0..found.activity.len()).collect();
+    order.sort_by(|&a, &b| found.activity[b].total_cmp(&found.activity[a]));
+    let name = |&j: &usize| {
+        let share = significant(found.activity[j] / total, 2);
+        Some(format!("`{}` ({share})", ensemble.inputs.get(j)?.name))
+    };
+    let most: Vec<String> = order.iter().take(MOST_IN_SENTENCE).filter_map(name).collect();
+    let sentence = format!(
+        "{} of {} directions carry 99 % of the mean square slope; the largest shares along single inputs are those of {}.",
+        found.directions(0.99),
+        found.eigenvalues.len(),
+        most.join(", ")
+    );
+    html! {
+        p { (paragraph(&sentence)) }
+        (numbers.table(&table, &caption))
+    }
+}
+
+/// Largest number of inputs whose shares a sentence names.
+const MOST_IN_SENTENCE: usize = 5;
+
+fn screened(ensemble: &EnsembleFindings, numbers: &mut Numbers) -> Markup {
     let Some(found) = &ensemble.screening else { return html! {} };
     let names = ensemble.inputs.iter().map(|input| input.name.clone());
     let (table, caption) = match found {

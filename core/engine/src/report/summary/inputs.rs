@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::value::{ByName, Quantity};
 use crate::report::findings::{EnsembleFindings, MeasuredFindings};
-use crate::screening::Screening;
+use crate::screening::{ActiveSubspace, Screening};
 
 /// Numbers of simulation runs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -22,6 +22,52 @@ pub struct Runs {
     #[serde(skip_serializing_if = "ByName::is_empty")]
     #[schemars(extend("propertyNames" = { "title": "input" }))]
     pub screening: ByName<ScreenedInput>,
+    /// Directions of the inputs in which the response changes, from the derivatives at the runs (`gradients` of
+    /// `[surrogate]`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub active_subspace: Option<Subspace>,
+}
+
+/// Mean outer product of the gradients of the response with themselves (active subspace), with inputs in standard deviations
+/// of their designs and responses in theirs over the runs.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Subspace {
+    /// Number of runs with derivatives.
+    pub runs: usize,
+    /// Eigenvalues, decreasing: mean square slopes of the response along the eigenvectors.
+    pub eigenvalues: Vec<Eigenvalue>,
+    /// Mean square slope of the response along each input.
+    #[schemars(extend("propertyNames" = { "title": "input" }))]
+    pub activity: ByName<Quantity>,
+}
+
+/// Eigenvalue, with the central 95 % of its values over resampled runs.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Eigenvalue {
+    /// Value from all runs.
+    pub value: Quantity,
+    /// Lower end.
+    pub q025: f64,
+    /// Upper end.
+    pub q975: f64,
+}
+
+impl Subspace {
+    fn of(found: &ActiveSubspace, ensemble: &EnsembleFindings) -> Self {
+        let pairs = found.eigenvalues.iter().zip(&found.spread);
+        let value = |(&value, &(q025, q975)): (&f64, &(f64, f64))| Eigenvalue {
+            value: value.into(),
+            q025,
+            q975,
+        };
+        let names = ensemble.inputs.iter().map(|input| input.name.clone());
+        let activity = found.activity.iter().map(|slope| Quantity(*slope));
+        Self {
+            runs: found.runs,
+            eigenvalues: pairs.map(value).collect(),
+            activity: names.zip(activity).collect(),
+        }
+    }
 }
 
 /// Effect of an input as far as the runs show it: from runs along trajectories, each of which changes one input at a time, its
@@ -50,6 +96,7 @@ impl Runs {
     pub fn of(ensemble: &EnsembleFindings) -> Self {
         Self {
             screening: screening(ensemble),
+            active_subspace: ensemble.active.as_ref().map(|found| Subspace::of(found, ensemble)),
             used: ensemble.points.rows(),
             failed: ensemble.failed.len(),
             invalid: ensemble.valid.iter().filter(|valid| !**valid).count(),

@@ -1,23 +1,22 @@
 //! Made-up results with the shape, units and sizes of the mercury target study (Radaideh et al., arXiv 2202.03959).
 
-use lacuna::data::{Axis, FailedRun, Layout, Measurements, Parameter, Replicate, Unit};
+use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
 use lacuna::plugin::Fact;
 use lacuna_linalg::Matrix;
 
 use crate::report::findings::{
-    CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
-    MeasuredFindings, Role, RunInput, SurrogateFindings,
+    CalibrationFindings, CoordinateFindings, Findings, FittedDistribution, MeasuredFindings, Role,
+    SurrogateFindings,
 };
-use crate::screening::{Dependence, Screening};
 use crate::stage::screen::FlaggedCurve;
 use crate::stage::validate::{ValidationCase, ValidationFindings};
 
 const SENSORS: [&str; 10] = ["B", "C", "G", "M", "R", "T", "U", "V", "Y", "Z"];
 const TIMES: usize = 100;
 const REPLICATES: usize = 16;
-const RUNS: usize = 603;
+pub(super) const RUNS: usize = 603;
 const NAMES: [&str; 4] = ["tensile_cutoff", "density", "sound_speed", "variance"];
 const MEAN: [f64; 4] = [6.49e4, 12_111.8, 1849.7, 1.02e-9];
 const SD: [f64; 4] = [2.39e3, 14.9, 5.3, 1.15e-11];
@@ -45,7 +44,7 @@ pub fn findings() -> Findings {
         .map(|(kind, plugin)| (kind.to_owned(), plugin.to_owned()))
         .to_vec(),
         parameters: parameters(),
-        ensemble: Some(ensemble()),
+        ensemble: Some(super::runs::ensemble()),
         measured: Some(measured(&layout)),
         surrogate: Some(surrogate(&layout)),
         calibration: Some(calibration()),
@@ -110,7 +109,7 @@ fn layout() -> Layout {
     }
 }
 
-fn parameters() -> Vec<Parameter> {
+pub(super) fn parameters() -> Vec<Parameter> {
     let parameter = |name: &str, symbol: &str, text: &str, design, prior, reference| Parameter {
         name: name.into(),
         symbol: symbol.into(),
@@ -124,33 +123,6 @@ fn parameters() -> Vec<Parameter> {
         parameter("density", "x2", "kg/m3", [1e4, 1.6e4], [1.1e4, 1.5e4], 13_500.0),
         parameter("sound_speed", "x3", "m/s", [1e3, 3e3], [1.2e3, 1.9e3], 1456.0),
     ]
-}
-
-fn ensemble() -> EnsembleFindings {
-    let mut rng = Stream::root(1).named("design").generator();
-    let ranges = [[0.0, 1.5e7], [1e4, 1.6e4], [1e3, 3e3]];
-    let points = Matrix::from_fn(RUNS, 3, |_, j| {
-        ranges[j][0] + (ranges[j][1] - ranges[j][0]) * uniform(&mut rng)
-    });
-    let valid: Vec<bool> = points.iter_rows().map(|p| p[1] * p[2] < 4.6e7).collect();
-    let input =
-        |(j, p): (usize, Parameter)| RunInput { name: p.name, symbol: p.symbol, places: vec![j] };
-    EnsembleFindings {
-        inputs: parameters().into_iter().enumerate().map(input).collect(),
-        valid,
-        failed: vec![
-            FailedRun { run: "run-0231".into(), reason: "exit status 137 after 3 attempts".into() },
-            FailedRun { run: "run-0388".into(), reason: "strain of sensor `Y` is NaN".into() },
-            FailedRun { run: "run-0412".into(), reason: "`out.e` ends at step 61 of 100".into() },
-        ],
-        in_prior: points.iter_rows().filter(|p| p[0] < 1.5e6 && p[2] < 1.9e3).count(),
-        screening: Some(Screening::Dependence(vec![
-            Dependence { index: 0.003, p: 0.41 },
-            Dependence { index: 0.12, p: 1e-9 },
-            Dependence { index: 0.31, p: 1e-12 },
-        ])),
-        points,
-    }
 }
 
 /// Strain at a wall: a rise, then two damped modes.

@@ -3,5 +3,6 @@
 
 mod fixture;
 mod page;
+mod runs;
 mod summary;
 mod xml;

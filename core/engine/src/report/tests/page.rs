@@ -109,6 +109,18 @@ fn evidence_and_predictions_are_told_on_the_page_and_in_the_terminal() {
 }
 
 #[test]
+fn directions_in_which_the_response_changes_are_listed() {
+    let page = render(&findings());
+    // Shares of the sum 1.104 of the eigenvalues.
+    let told = "3 of 3 directions carry 99 % of the mean square slope; the largest shares along single inputs";
+    assert!(!page.contains(told), "two directions carry 99.6 %");
+    assert!(page.contains(&told.replace("3 of 3", "2 of 3")));
+    for cell in ["0.900", "0.800", "0.8152", "0.9964"] {
+        assert!(page.contains(&format!(">{cell}</td>")), "no {cell}");
+    }
+}
+
+#[test]
 fn stages_that_did_not_run_are_left_out() {
     let elements = elements(&bare());
     assert!(!elements.iter().any(|e| e.name == "svg"));

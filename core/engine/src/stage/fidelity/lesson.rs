@@ -145,6 +145,7 @@ impl Lesson<'_> {
                 layouts: self.layouts,
                 points: &points,
                 responses: &targets,
+                gradients: None,
             };
             Some(self.plugin.fit(&training, self.stream, progress)?)
         } else {

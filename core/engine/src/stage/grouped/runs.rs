@@ -42,6 +42,7 @@ pub(super) fn fitted(study: &Study, trained: &Trained, own: Fitted) -> Fitted {
         sample_points: points(study, trained, &own.sample_points),
         curves,
         bytes: own.bytes,
+        active: own.active,
     }
 }
 

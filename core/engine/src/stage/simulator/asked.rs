@@ -1,9 +1,11 @@
-//! Layout that is requested from a model, and the folder of its runs.
+//! Layout that is requested from a model, the shape of its answers, and the folder of its runs.
 
 use std::path::PathBuf;
 
 use lacuna::data::{Axis, Coordinates, Layout};
+use lacuna::plugin::model::EvalError;
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 
 /// The study's layout in the model's units, and the factor from the model's unit of the response to the study's.
 pub(super) fn asked(ours: &Layout, theirs: &Layout) -> Result<(Layout, f64), Stop> {
@@ -29,4 +31,15 @@ pub(super) fn folder(place: usize, name: &str) -> PathBuf {
     }
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
     format!("{}-{}", place + 1, name.chars().map(plain).collect::<String>()).into()
+}
+
+/// Refuses derivatives that are not one row per output and one column per input.
+pub(super) fn shaped(jacobian: &Matrix, outputs: usize, inputs: usize) -> Result<(), EvalError> {
+    let (rows, columns) = (jacobian.rows(), jacobian.columns());
+    if (rows, columns) == (outputs, inputs) {
+        return Ok(());
+    }
+    Err(EvalError::Fatal(format!(
+        "the model's derivatives are {rows} x {columns}, expected {outputs} outputs x {inputs} inputs"
+    )))
 }

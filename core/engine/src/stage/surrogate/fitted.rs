@@ -10,6 +10,7 @@ use lacuna_run::Artifact;
 use lacuna_run::arrays::{self, Array};
 use serde::{Deserialize, Serialize};
 
+use crate::screening::ActiveSubspace;
 use crate::stage::emulator_error::{Curves, rows_near_prior};
 use crate::study::Study;
 
@@ -28,6 +29,8 @@ pub struct Fitted {
     /// Errors that enter the likelihood: at training runs those of emulators that were fitted without the run if that
     /// is feasible, otherwise those of `samples`.
     pub curves: Curves,
+    /// Directions in which the response changes, if the derivatives at the training runs are known.
+    pub active: Option<ActiveSubspace>,
 }
 
 /// Errors of an emulator.
@@ -71,7 +74,12 @@ impl Artifact for Fitted {
         let stated = curves.stated.as_ref();
         arrays.extend(stated.map(|s| Array::matrix("left_out_variance", "run", "output", s)));
         arrays::write(&folder.join("errors.nc"), &[], &arrays)?;
-        Ok(["emulator.bin", "errors.json", "errors.nc"].map(str::to_owned).to_vec())
+        let mut written = ["emulator.bin", "errors.json", "errors.nc"].map(str::to_owned).to_vec();
+        if let Some(active) = &self.active {
+            files::write_json(&folder.join(ACTIVE), active)?;
+            written.push(ACTIVE.to_owned());
+        }
+        Ok(written)
     }
 
     fn load(folder: &Path) -> Result<Self, Stop> {
@@ -88,9 +96,16 @@ impl Artifact for Fitted {
             samples: arrays::read(&path, "samples")?.into_matrix(),
             sample_points,
             curves,
+            active: folder
+                .join(ACTIVE)
+                .is_file()
+                .then(|| files::read_json(&folder.join(ACTIVE)))
+                .transpose()?,
         })
     }
 }
+
+const ACTIVE: &str = "active_subspace.json";
 
 impl Fitted {
     /// Errors at the runs inside the prior's support, `runs x outputs`; at all runs if fewer than fifty are inside.
