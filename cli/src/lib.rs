@@ -9,6 +9,7 @@ mod plugins;
 mod progress;
 mod serve;
 mod study;
+mod terminal;
 #[cfg(test)]
 mod tests;
 mod work;
@@ -17,6 +18,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
+use terminal::print;
 // The plugins register themselves; naming their crate makes the linker include it.
 use lacuna_plugins as _;
 
@@ -248,10 +250,14 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::New { what } => new::write(&what),
     };
     match result {
+        Ok(()) if terminal::has_failed() => {
+            terminal::tell("error: standard output could not be written in full");
+            1
+        }
         Ok(()) => 0,
         Err(error) => {
             let (text, code) = told(&error);
-            eprintln!("{}", text.trim_end());
+            terminal::tell(text.trim_end());
             code
         }
     }
@@ -279,10 +285,4 @@ fn told(error: &anyhow::Error) -> (String, u8) {
         return (text.clone(), 2);
     }
     (format!("error: {error:#}"), if error.is::<Untrusted>() { 3 } else { 1 })
-}
-
-/// Prints a line; a closed pipe is not an error.
-fn print(text: &str) {
-    use std::io::Write as _;
-    let _ = writeln!(std::io::stdout(), "{text}");
 }

@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use lacuna::run::Observer;
 
+use crate::terminal::{clean, tell};
+
 /// Interval between plain lines.
 const INTERVAL: Duration = Duration::from_secs(10);
 
@@ -43,8 +45,8 @@ impl Terminal {
     /// Prints a line above the bar.
     fn say(&self, text: &str) {
         self.with(|slot| match slot.as_ref().and_then(|current| current.bar.as_ref()) {
-            Some(bar) => bar.println(text),
-            None => eprintln!("{text}"),
+            Some(bar) => bar.println(clean(text)),
+            None => tell(text),
         });
     }
 }
@@ -78,7 +80,7 @@ impl Observer for Terminal {
                 bar.set_position(done);
             } else if !self.interactive && current.spoken.elapsed() > INTERVAL {
                 current.spoken = Instant::now();
-                eprintln!("{}", plain_line(current, first, done));
+                tell(&plain_line(current, first, done));
             }
         });
     }
@@ -90,7 +92,7 @@ impl Observer for Terminal {
             bar.finish_and_clear();
         }
         let seconds = current.begun.elapsed().as_secs_f64();
-        eprintln!("{stage:<10} {seconds:>8.2} s   {note}");
+        tell(&format!("{stage:<10} {seconds:>8.2} s   {note}"));
     }
 
     fn warn(&self, text: &str) {

@@ -17,6 +17,7 @@ use lacuna_run::RunDirectory;
 
 use crate::plugins::Libraries;
 use crate::progress::Terminal;
+use crate::terminal::{clean, print_styled, tell};
 use crate::{Untrusted, misuse, plugins, print};
 
 /// Keys set on the command line.
@@ -210,6 +211,14 @@ pub fn kept_study_for(folder: &Path, purpose: Use) -> anyhow::Result<Study> {
     let mut study = sound(resolve::load_for(&resolved, &[], purpose), &resolved)?;
     let written: PathBuf = folder.join("study.toml");
     study.text = String::from_utf8_lossy(&files::read(&written)?).into_owned();
+    let edited = |hash: String| hash != files::hash(study.text.as_bytes());
+    if stage::manifest::study_hash(folder).is_some_and(edited) {
+        let (file, resolved) = (written.display(), resolved.display());
+        tell(&format!(
+            "warning: {file} has been changed since the run began. It is a copy and is not read: the run goes on as {resolved} says. \
+             To change a study, edit its own file and run that"
+        ));
+    }
     Ok(study)
 }
 
@@ -221,7 +230,7 @@ fn is_finished(folder: &Path) -> bool {
 pub fn print_summary(findings: &Findings) {
     let text = summary_text(findings);
     let (first, rest) = text.trim_end().split_once('\n').unwrap_or((text.trim_end(), ""));
-    print(&coloured(first, findings.assessment.level));
+    print_styled(&coloured(&clean(first), findings.assessment.level));
     print(rest);
 }
 

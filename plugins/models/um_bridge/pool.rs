@@ -1,6 +1,7 @@
 //! Servers of one model: each request goes to one that is free.
 
 use std::fmt;
+use std::io::Write as _;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -61,7 +62,11 @@ impl Pool {
                 Err(Error::Unreachable { .. }) => {
                     let gone = self.callers[place].info().err();
                     if let Some(error) = &gone {
-                        eprintln!("warning: {error}; this server is not used any more");
+                        // Who closes the pipe of errors has no use for them.
+                        let _ = writeln!(
+                            std::io::stderr(),
+                            "warning: {error}; this server is not used any more"
+                        );
                     }
                     self.give_back(place, gone);
                 }

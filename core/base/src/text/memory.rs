@@ -14,16 +14,28 @@ pub fn amount(bytes: f64) -> String {
     format!("{value:.digits$} {}", UNITS[thousands as usize])
 }
 
-/// Checks the number of positions along an axis.
+/// Memory of this machine, in bytes; `None` where it does not say.
+pub fn of_machine() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+    let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(1024.0 * kibibytes)
+}
+
+/// Checks the number of positions along an axis, which are made when a study is read.
 ///
 /// # Errors
 /// Reason why the axis cannot have this many positions.
 pub fn axis(count: usize) -> Result<(), String> {
+    axis_within(count, of_machine().map_or(MOST, |memory| MOST.min(memory / 4.0)))
+}
+
+fn axis_within(count: usize, memory: f64) -> Result<(), String> {
     let bytes = NUMBER * count as f64;
-    if bytes <= MOST {
+    if bytes <= memory {
         return Ok(());
     }
-    let (needed, most) = (amount(bytes), MOST / NUMBER);
+    let (needed, most) = (amount(bytes), (memory / NUMBER).floor());
     Err(format!(
         "expected a `count` of at most {most}, found {count}, which needs {needed} of memory"
     ))
@@ -48,9 +60,10 @@ mod tests {
 
     #[test]
     fn axes_have_an_end() {
-        assert_eq!(axis(1_000_000_000), Ok(()));
+        assert_eq!(axis(1_000_000), Ok(()));
+        assert_eq!(axis_within(1_000_000_000, MOST), Ok(()));
         assert_eq!(
-            axis(1_000_000_000_000),
+            axis_within(1_000_000_000_000, MOST),
             Err("expected a `count` of at most 137438953472, found 1000000000000, \
                  which needs 8.0 TB of memory"
                 .to_owned())

@@ -19,6 +19,15 @@ pub fn origin(root: &Path) -> Option<PathBuf> {
     Some(PathBuf::from(text.trim_end_matches('\n')))
 }
 
+/// Beginning of the line of `resolved.toml` that holds the hash of the study as it was written.
+const OF_STUDY: &str = "# sha256 of study.toml: ";
+
+/// SHA-256 of the study as it was written when the run began; `None` if it was not recorded.
+pub fn study_hash(root: &Path) -> Option<String> {
+    let text = std::fs::read_to_string(root.join("resolved.toml")).ok()?;
+    Some(text.lines().find_map(|line| line.strip_prefix(OF_STUDY))?.to_owned())
+}
+
 /// Writes `study.toml` (byte for byte), `resolved.toml` (which runs as it is) and the path of the study.
 pub fn begin(study: &Study, run: &mut RunDirectory) -> Result<(), Stop> {
     run.watch(study.faults());
@@ -33,9 +42,9 @@ pub fn begin(study: &Study, run: &mut RunDirectory) -> Result<(), Stop> {
     files::write_atomic(&run.root().join("study.toml"), study.text.as_bytes())?;
     let resolved = emit::to_toml(&study.resolved)
         .map_err(|error| Stop::new(format!("cannot write resolved.toml: {error}")))?;
-    let version = env!("CARGO_PKG_VERSION");
+    let (version, hash) = (env!("CARGO_PKG_VERSION"), files::hash(study.text.as_bytes()));
     let head = format!(
-        "# Written by lacuna {version}: every default filled in. It runs as it stands.\n\n"
+        "# Written by lacuna {version}: every default filled in. It runs as it stands.\n{OF_STUDY}{hash}\n\n"
     );
     files::write_atomic(&run.root().join("resolved.toml"), (head + &resolved).as_bytes())
 }

@@ -1,7 +1,7 @@
 //! Memory needed by the sizes in a study: an impossible size is refused before anything is allocated.
 
 use lacuna::plugin::sampler::Plan;
-use lacuna::text::memory::{MOST, NUMBER, amount};
+use lacuna::text::memory::{MOST, NUMBER, amount, of_machine};
 use lacuna::text::{Complaints, Node, Problems};
 
 use super::plain::Study;
@@ -57,7 +57,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
 
 /// Reports every size that this machine cannot hold.
 pub(super) fn environment(study: &Study, root: &Node, problems: &mut Problems) {
-    if let Some(memory) = memory() {
+    if let Some(memory) = of_machine() {
         refuse(study, memory, "this machine has", root, problems);
     }
 }
@@ -72,14 +72,6 @@ fn refuse(study: &Study, most: f64, whose: &str, root: &Node, problems: &mut Pro
             .expected(format!("at most {}", (size * (most / bytes)).floor()))
             .found(size);
     }
-}
-
-/// The memory of this machine in bytes; `None` where it does not say.
-fn memory() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
-    let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(1024.0 * kibibytes)
 }
 
 /// Everything in a study that is a size, with what it asks for.

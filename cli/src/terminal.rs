@@ -1,0 +1,59 @@
+//! Standard output and standard error: text of studies and data cannot command the terminal, a closed pipe ends nothing, and
+//! output that cannot be written is an error.
+
+use std::io::{ErrorKind, Write as _};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// True once standard output could not be written for another reason than a closed pipe.
+static FAILED: AtomicBool = AtomicBool::new(false);
+
+/// Prints a line to standard output.
+pub fn print(text: &str) {
+    print_styled(&clean(text));
+}
+
+/// Prints a line that has escape sequences of its own.
+pub fn print_styled(text: &str) {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            FAILED.store(true, Ordering::Relaxed)
+        }
+        // Who closes a pipe has read enough.
+        _ => {}
+    }
+}
+
+/// Prints a line to standard error.
+pub fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", clean(text));
+}
+
+/// True if standard output has not received all that was printed.
+pub fn has_failed() -> bool {
+    FAILED.load(Ordering::Relaxed)
+}
+
+/// Text without control characters but ends of lines and tabs; a character that commands a terminal is shown as a picture
+/// of itself.
+pub fn clean(text: &str) -> String {
+    let shown = |c: char| match c {
+        '\n' | '\t' => c,
+        '\u{7f}' => '\u{2421}',
+        c if u32::from(c) < 0x20 => char::from_u32(0x2400 + u32::from(c)).unwrap_or('\u{fffd}'),
+        c if c.is_control() => '\u{fffd}',
+        c => c,
+    };
+    text.chars().map(shown).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::clean;
+
+    #[test]
+    fn text_cannot_command_a_terminal() {
+        assert_eq!(clean("a\u{1b}[31mb\tc\nd\r\u{9b}2J\u{7f}"), "a␛[31mb\tc\nd␍\u{fffd}2J␡");
+        assert_eq!(clean("σ² ± 0.1 µm"), "σ² ± 0.1 µm");
+    }
+}
