@@ -58,7 +58,7 @@ fn figure(findings: &Findings, ensemble: &EnsembleFindings, numbers: &mut Number
         "runs inside the prior's box, for only there the surrogate's training bears on the posterior; \
          a box with few runs wants a second design.",
     );
-    numbers.figure(&[drawing], &keys, &caption)
+    numbers.figure("design", &[drawing], &keys, &caption)
 }
 
 fn column(
