@@ -98,9 +98,26 @@ const byPointer = (svg, plots, marks, figure) => {
     const [top, bottom] = [y0, y1].map((v) => keep(v, y.p0, y.p1)).sort((a, b) => a - b);
     return { left, right, top, bottom };
   };
-  svg.addEventListener("pointerdown", (event) => {
+  const look = (event) => {
+    marks.hide();
     const plot = plotAt(event);
-    if (!plot || event.button !== 0 || event.pointerType === "touch" || !(plot.zooms || plot.pair)) return;
+    if (event.target.hint) say(event.target.hint, event.clientX, event.clientY);
+    else if (!plot) hush();
+    else {
+      const place = plot.at(event);
+      const spots = near(plot, place);
+      if (spots.length) marks.show(plot, spots[0].shown);
+      say(readOut(plot, spots, place), event.clientX, event.clientY);
+    }
+  };
+  svg.addEventListener("pointerdown", (event) => {
+    // A finger reads out where it taps; it drags the page, not a rectangle.
+    if (event.pointerType === "touch") {
+      look(event);
+      return;
+    }
+    const plot = plotAt(event);
+    if (!plot || event.button !== 0 || !(plot.zooms || plot.pair)) return;
     start = { plot, at: plot.at(event) };
     svg.setPointerCapture(event.pointerId);
     event.preventDefault();
@@ -113,16 +130,7 @@ const byPointer = (svg, plots, marks, figure) => {
       start.plot.group.append(frame);
       return;
     }
-    marks.hide();
-    const plot = plotAt(event);
-    if (event.target.hint) say(event.target.hint, event.clientX, event.clientY);
-    else if (!plot) hush();
-    else {
-      const place = plot.at(event);
-      const spots = near(plot, place);
-      if (spots.length) marks.show(plot, spots[0].shown);
-      say(readOut(plot, spots, place), event.clientX, event.clientY);
-    }
+    look(event);
   });
   svg.addEventListener("pointerup", (event) => {
     if (!start) return;
@@ -133,7 +141,7 @@ const byPointer = (svg, plots, marks, figure) => {
     figure.choose(plot, area.right - area.left > 5 && area.bottom - area.top > 5 ? area : null);
   });
   svg.addEventListener("pointercancel", () => { start = null; frame.remove(); });
-  svg.addEventListener("pointerleave", () => { if (!start) marks.clear(); });
+  svg.addEventListener("pointerleave", (event) => { if (!start && event.pointerType !== "touch") marks.clear(); });
   svg.addEventListener("dblclick", () => figure.reset());
 };
 

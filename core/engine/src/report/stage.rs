@@ -76,10 +76,9 @@ fn write_figures(folder: &Path, figures: &[FigureFile]) -> Result<(), Stop> {
     }
     let found = fs::read_dir(folder).map_err(|error| files::cannot_read(folder, &error))?;
     for path in found.filter_map(|entry| Some(entry.ok()?.path())) {
-        let is_ours = path.extension().is_some_and(|end| end == "svg" || end == "csv");
-        let is_current =
-            figures.iter().any(|figure| path.file_stem().is_some_and(|s| *s == *figure.name));
-        if is_ours && !is_current {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let stem = name.strip_suffix(".svg").or_else(|| name.strip_suffix(".csv"));
+        if stem.is_some_and(|stem| figures.iter().all(|figure| figure.name != stem)) {
             fs::remove_file(&path).map_err(|error| files::cannot_write(&path, &error))?;
         }
     }

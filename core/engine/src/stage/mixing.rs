@@ -7,7 +7,7 @@ use rayon::prelude::*;
 pub const MOST_COORDINATES: usize = 16;
 
 /// Largest number of chains that are described, besides stranded ones.
-const MOST_CHAINS: usize = 40;
+const MOST_CHAINS: usize = 24;
 
 /// Number of places at which the distribution function of ranks is given, without its ends.
 const PLACES: usize = 39;

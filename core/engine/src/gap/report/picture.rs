@@ -1,4 +1,4 @@
-//! What the search did as one picture: the gap before, what each effect took, and the remainder.
+//! The work of the search as one picture: the gap before, what each effect took, and the remainder.
 
 use maud::{Markup, html};
 

@@ -72,7 +72,8 @@ fn draw_cell(svg: &mut Svg, cell: Area, names: (&str, &str), value: f64) {
     svg.rectangle(&format!("cell {}", shade(value)), cell, &hint);
     if cell.width >= SMALLEST_WITH_NUMBER {
         let middle = (cell.x + 0.5 * cell.width, cell.y + 0.5 * cell.height + 4.5);
-        let class = if value.abs() > 0.6 { "cell-light" } else { "cell-dark" };
+        // The two darkest shades on either side carry light letters.
+        let class = if value.abs() >= 0.7 { "cell-light" } else { "cell-dark" };
         svg.text(class, middle, Anchor::Middle, &text);
     }
 }

@@ -78,7 +78,7 @@ pub fn small_multiples(panels: &[Panel], x: &Axis, y: &Axis, description: &str) 
     panels.iter().map(one).collect()
 }
 
-/// What a panel shows, in a sentence: its title and remark, and the range of its last named curve.
+/// A panel in a sentence: its title and remark, and the range of its last named curve.
 fn in_words(panel: &Panel, axes: (&Axis, &Axis), description: &str) -> String {
     let named = panel.curves.iter().rev().find(|c| !c.name.is_empty() && drawable(&c.points));
     let range = named.map(|c| format!("{} {}", c.name, extremes_in_words(&c.points, axes)));

@@ -107,7 +107,7 @@ fn draw_marks(svg: &mut Svg, frame: &Frame, across: &[Mark], along: &[Mark]) {
 /// The nearest point of two interleaved rectangular lattices is the nearest centre of a hexagonal lattice (Carr,
 /// Littlefield, Nicholson and Littlefield, JASA 82, 1987).
 fn draw_hexagons(svg: &mut Svg, frame: &Frame, x: &[f64], y: &[f64]) {
-    let width = frame.area.width / 26.0;
+    let width = frame.area.width / 22.0;
     let height = width * 3.0_f64.sqrt();
     let mut counts: BTreeMap<(i64, i64, bool), usize> = BTreeMap::new();
     for point in x.iter().zip(y).map(|(&x, &y)| frame.at((x, y))) {

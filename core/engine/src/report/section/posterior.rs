@@ -297,7 +297,24 @@ fn pairs(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
         "the posterior.",
         "narrow ridges, bananas, several islands.",
     );
-    numbers.figure("pairs", &[pair_matrix(&columns, "the posterior in pairs")], &keys, &caption)
+    numbers.figure("pairs", &[pair_matrix(&columns, &in_pairs(calibration))], &keys, &caption)
+}
+
+/// Description of the pairs: the strongest correlation among the coordinates that are drawn.
+fn in_pairs(calibration: &CalibrationFindings) -> String {
+    let n = calibration.coordinates.len().min(MOST_PAIRED);
+    let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let size = |&(i, j): &(usize, usize)| calibration.correlation[(i, j)].abs();
+    let known = pairs.filter(|pair| size(pair).is_finite());
+    match known.max_by(|a, b| size(a).total_cmp(&size(b))) {
+        Some((i, j)) => format!(
+            "the posterior in pairs; the strongest correlation is {}, of {} and {}",
+            typeset(&fixed(calibration.correlation[(i, j)], 2)),
+            calibration.coordinates[j].name,
+            calibration.coordinates[i].name
+        ),
+        None => "the posterior in pairs; no correlation is known".to_owned(),
+    }
 }
 
 /// The MAP and the reference; every column has both, so that they form pairs.

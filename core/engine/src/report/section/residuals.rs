@@ -1,4 +1,4 @@
-//! Where data and calibrated model disagree: the residuals as a map of sensors and times.
+//! Residuals of the calibrated model as a map of sensors and times.
 
 use maud::{Markup, html};
 

@@ -14,7 +14,7 @@ use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings}
 const MOST_POINTS: usize = 32_000;
 
 /// Approximate number of chains that are drawn.
-const MOST_CHAINS: usize = 200;
+const MOST_CHAINS: usize = 100;
 
 /// Largest number of coordinates with a trace.
 const MOST_ROWS: usize = 16;

@@ -122,7 +122,12 @@ fn sensitivity(findings: &Findings, sobol: &[(f64, f64)], numbers: &mut Numbers)
         "a small total index: the data can say little about that parameter. A total far above the \
          first order: it acts through the others.",
     );
-    numbers.figure("sobol", &[chart.draw("Sobol indices of every parameter")], &keys, &caption)
+    numbers.figure(
+        "sobol-indices",
+        &[chart.draw("Sobol indices of every parameter")],
+        &keys,
+        &caption,
+    )
 }
 
 /// The leave-one-out error along the curves.
