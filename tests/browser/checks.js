@@ -129,8 +129,10 @@
     at(0.02, "pointerdown");
     at(0.5, "pointermove");
     at(0.98, "pointerup");
-    const marked = document.querySelectorAll('figure[data-name="posterior-draws"] .brushed').length;
-    if (marked === 0) note("a region of the pairs marks no response");
+    for (const figure of ["posterior-draws", "validation"]) {
+      const marked = document.querySelectorAll(`figure[data-name="${figure}"] path.brushed`).length;
+      if (marked === 0) note(`a region of the pairs marks no response in ${figure}`);
+    }
     key(svg, "Escape");
     if (document.querySelectorAll(".brushed").length) note("Escape leaves marks");
   }

@@ -60,6 +60,14 @@ const within = (plot, area) => {
     return u >= low[0] && u <= high[0] && v >= low[1] && v <= high[1];
   });
 };
+// The same curve in another plot, whose axes show the same quantities in other ranges.
+const carried = (path, from, to) => {
+  const at = ([x, y]) => [placeOf(to.shown.x, valueAt(from.drawn.x, x)), placeOf(to.shown.y, valueAt(from.drawn.y, y))];
+  const pieces = piecesOf(path).map((piece) => `M${piece.map((p) => at(p).map((v) => v.toFixed(1)).join(" ")).join("L")}`);
+  const marked = element("path", { class: "brushed", d: pieces.join("") });
+  marked.pieces = piecesOf(path).map((piece) => piece.map(([x, y]) => [placeOf(to.drawn.x, valueAt(from.drawn.x, x)), placeOf(to.drawn.y, valueAt(from.drawn.y, y))]));
+  return marked;
+};
 // Marks draws in all pairs, and their responses in all figures that have them.
 const markDraws = (figure, chosen) => {
   unmark();
@@ -70,10 +78,12 @@ const markDraws = (figure, chosen) => {
   }
   for (const plot of figures.flatMap(({ plots }) => plots)) {
     const paths = new Map([...plot.inside.querySelectorAll("path.s-draw")].map((path) => [path.dataset.name, path]));
+    if (!paths.size) continue;
+    // The panels of the calibrated simulation with the same title show the same quantity.
+    const alike = figures.filter(({ node }) => node.dataset.name === "validation").flatMap(({ plots }) => plots)
+      .filter((other) => titleOf(other.svg) === titleOf(plot.svg) && other.labels.y === plot.labels.y);
     for (const path of chosen.map((i) => paths.get(`draw ${i + 1}`)).filter((own) => own)) {
-      const marked = element("path", { class: "brushed", d: path.getAttribute("d") });
-      marked.pieces = piecesOf(path);
-      overlay(plot, marked);
+      for (const to of [plot, ...alike]) overlay(to, carried(path, plot, to));
     }
   }
   const some = chosen.length === 1 ? `Draw ${chosen[0] + 1}` : `${chosen.length} of ${draws.length} drawn draws`;

@@ -11,6 +11,8 @@ use crate::page::svg::{Anchor, Area, Svg};
 const NAMES: f64 = 210.0;
 /// Smaller squares have no room for their number, which is then shown as a hint only.
 const SMALLEST_WITH_NUMBER: f64 = 34.0;
+/// Smaller squares have no hint.
+const SMALLEST_WITH_HINT: f64 = 8.0;
 /// Smaller squares have no room for a name below them: columns are numbered instead.
 const SMALLEST_WITH_NAME: f64 = 60.0;
 
@@ -68,7 +70,12 @@ fn sized(names: &[String], correlation: &Matrix, width: f64, description: &str) 
 
 fn draw_cell(svg: &mut Svg, cell: Area, names: (&str, &str), value: f64) {
     let text = typeset(&fixed(value, 2));
-    let hint = format!("{}, {}: {text}", names.0, names.1);
+    // Smaller cells cannot be pointed at.
+    let hint = if cell.width < SMALLEST_WITH_HINT {
+        String::new()
+    } else {
+        format!("{}, {}: {text}", names.0, names.1)
+    };
     svg.rectangle(&format!("cell {}", shade(value)), cell, &hint);
     if cell.width >= SMALLEST_WITH_NUMBER {
         let middle = (cell.x + 0.5 * cell.width, cell.y + 0.5 * cell.height + 4.5);

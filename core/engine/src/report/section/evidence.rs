@@ -20,9 +20,11 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         @for sentence in &sentences { p { (paragraph(sentence)) } }
         @if let Some(left) = &calibration.left_out { (shapes(left, numbers)) }
         p {
-            "Neither number means anything alone: they compare studies of the same data, side by side in \
-             `lacuna compare`. The difference of two log evidences is the logarithm of the Bayes factor; it \
-             depends on the priors of all unknowns, the predictions hardly do."
+            (paragraph(
+                "Neither number means anything alone: they compare studies of the same data, side by side in \
+                 `lacuna compare`. The difference of two log evidences is the logarithm of the Bayes factor; it \
+                 depends on the priors of all unknowns, the predictions hardly do."
+            ))
         }
     };
     Some(Section { id: "evidence", title: "Evidence", content })
