@@ -74,9 +74,10 @@ impl Digits {
         }
         if self.plain {
             let text = format!("{value:.*}", self.power.unsigned_abs() as usize);
-            let short = match text.contains('.') {
-                true => text.trim_end_matches('0').trim_end_matches('.'),
-                false => &text,
+            let short = if text.contains('.') {
+                text.trim_end_matches('0').trim_end_matches('.')
+            } else {
+                &text
             };
             return if short == "-0" { "0".to_owned() } else { short.to_owned() };
         }

@@ -51,7 +51,7 @@ pub fn pair_matrix(columns: &[PairColumn], description: &str) -> Drawing {
                 frame.inside(svg, &axes[x], &axes[y], |svg| {
                     draw_hexagons(svg, &frame, &columns[x].draws, &columns[y].draws);
                     draw_marks(svg, &frame, &columns[x].marks, &columns[y].marks);
-                })
+                });
             });
         }
     });
