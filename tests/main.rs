@@ -5,6 +5,7 @@
 
 mod assess;
 mod bad_input;
+mod browser;
 mod campaign;
 mod commands;
 mod coverage;

@@ -138,7 +138,11 @@ pub fn results(out: &Path) -> BTreeMap<String, String> {
     for entry in fs::read_dir(out).unwrap() {
         let folder = entry.unwrap().path();
         let name = folder.file_name().unwrap().to_string_lossy().into_owned();
-        if !folder.is_dir() || name.starts_with('.') || name.ends_with("report") {
+        if !folder.is_dir()
+            || name.starts_with('.')
+            || name.ends_with("report")
+            || name == "figures"
+        {
             continue;
         }
         for entry in fs::read_dir(&folder).unwrap() {

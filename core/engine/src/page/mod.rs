@@ -4,15 +4,20 @@
 pub mod chart;
 pub mod curve;
 pub mod curves;
+pub mod drawing;
+mod figure;
+mod file;
 pub mod number;
 pub mod scale;
 pub mod svg;
 pub mod table;
+pub mod table_of_values;
 
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
-use self::chart::{Key, Swatch};
-use self::table::Table;
+use self::file::{DRAWING, PALETTE};
+
+pub use self::figure::{FigureFile, Numbers};
 
 /// Section of the page.
 pub struct Section {
@@ -54,64 +59,20 @@ impl Caption {
     }
 }
 
-/// Counters of figures and tables.
-#[derive(Debug, Default)]
-pub struct Numbers {
-    figures: usize,
-    tables: usize,
+/// Style sheets of all pages.
+pub fn style() -> String {
+    [PALETTE, include_str!("page.css"), DRAWING].concat()
 }
 
-impl Numbers {
-    /// A numbered figure: legend, drawings below each other, caption.
-    pub fn figure(&mut self, drawings: &[String], keys: &[Key], caption: &Caption) -> Markup {
-        self.figures += 1;
-        let number = self.figures;
-        html! {
-            figure id=(format!("figure-{number}")) {
-                @if !keys.is_empty() { div.legend { @for key in keys { (legend_key(key)) } } }
-                @for drawing in drawings { div.scroll { (PreEscaped(drawing)) } }
-                figcaption { b { "Figure " (number) ". " } (caption.html()) }
-            }
-        }
-    }
-
-    /// A numbered table below its caption.
-    pub fn table(&mut self, table: &Table, caption: &Caption) -> Markup {
-        self.tables += 1;
-        let number = self.tables;
-        html! {
-            figure.table id=(format!("table-{number}")) {
-                figcaption { b { "Table " (number) ". " } (caption.html()) }
-                (table.html())
-            }
-        }
-    }
-}
-
-fn legend_key(key: &Key) -> Markup {
-    let class = key.class;
-    let width = if key.swatch == Swatch::Dot { 12 } else { 30 };
-    let shape = match key.swatch {
-        Swatch::Line => format!("<path class=\"line {class}\" d=\"M1 7l28 0\"/>"),
-        Swatch::Area => {
-            format!("<rect class=\"{class}\" x=\"1\" y=\"2\" width=\"28\" height=\"10\"/>")
-        }
-        Swatch::Dot => format!("<path class=\"{class} large\" d=\"M6 7l.1 0\"/>"),
-    };
-    html! {
-        span.key data-class=(class) {
-            (PreEscaped(format!(
-                "<svg width=\"{width}\" height=\"14\" aria-hidden=\"true\">{shape}</svg>"
-            )))
-            (key.label)
-        }
-    }
-}
-
-/// Style sheet of all pages.
-pub const STYLE: &str = include_str!("page.css");
-/// Script of a page: it shows and hides the shapes that a legend entry names.
-pub const SCRIPT: &str = include_str!("page.js");
+/// Script of a page: it lets the reader explore the figures, which say everything without it too.
+pub const SCRIPT: &str = concat!(
+    "(() => {\n",
+    include_str!("plot.js"),
+    include_str!("explore.js"),
+    include_str!("files.js"),
+    include_str!("figure.js"),
+    "})();"
+);
 
 /// A paragraph in which words between backticks are set as code.
 pub fn paragraph(text: &str) -> Markup {

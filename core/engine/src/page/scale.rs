@@ -60,6 +60,11 @@ impl Scale {
         self.range.0 + share * (self.range.1 - self.range.0)
     }
 
+    /// Returns true if equal ratios have equal lengths.
+    pub fn is_logarithmic(&self) -> bool {
+        self.kind == Kind::Logarithmic
+    }
+
     /// Range of values of the scale.
     pub fn domain(&self) -> (f64, f64) {
         self.domain

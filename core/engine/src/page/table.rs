@@ -58,7 +58,7 @@ impl Table {
     /// The table as HTML.
     pub fn html(&self) -> Markup {
         html! {
-            div.scroll { table {
+            div.scroll role="group" tabindex="0" aria-label="table" { table {
                 thead { tr {
                     @for (head, side) in &self.heads { th.(class(*side)) { (head) } }
                 } }

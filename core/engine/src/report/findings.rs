@@ -13,7 +13,9 @@ use crate::screening::{ActiveSubspace, Screening};
 
 pub use crate::gap::result::GapFindings;
 use crate::stage::calibrate::PopulationOutcome;
+pub use crate::stage::drawn::DrawnResponses;
 pub use crate::stage::fields::{FieldBand, FieldFindings};
+pub use crate::stage::mixing::Mixing;
 pub use crate::stage::quantities::{
     Bounds, BoundsFindings, End, InputShare, PROBABILITIES, Propagated, QuantityFindings, Range,
 };
@@ -52,6 +54,8 @@ pub struct Findings {
     pub surrogate: Option<SurrogateFindings>,
     /// Calibration.
     pub calibration: Option<CalibrationFindings>,
+    /// Draws of the posterior with their responses.
+    pub drawn: Option<DrawnResponses>,
     /// Validation.
     pub validation: Option<ValidationFindings>,
     /// Predicted quantities of interest.
@@ -144,6 +148,10 @@ pub struct SurrogateFindings {
     pub near_posterior: Option<(f64, usize)>,
     /// Validation pairs (simulated, emulated) for a scatter plot, thinned to a few thousand.
     pub pairs: Vec<(f64, f64)>,
+    /// Leave-one-out error of each output relative to its variance.
+    pub loo_by_output: Vec<f64>,
+    /// Total Sobol indices of each output, `outputs x parameters`, if known.
+    pub total_by_output: Option<Matrix>,
     /// First-order and total Sobol indices over all outputs, one pair per parameter, if known.
     pub sobol: Option<Vec<(f64, f64)>>,
 }
@@ -175,6 +183,8 @@ pub struct CalibrationFindings {
     pub log_density: (f64, f64),
     /// Best draw, in natural units.
     pub best_draw: Vec<f64>,
+    /// How the chains of the first coordinates mix.
+    pub mixing: Vec<Mixing>,
     /// Facts about the sampler.
     pub facts: Vec<Fact>,
     /// Populations from which parameters by group are drawn.
@@ -202,6 +212,8 @@ pub struct LeftOutFindings {
     pub limit: f64,
     /// Number of data.
     pub count: usize,
+    /// Shape k-hat of the importance ratios of each datum, in the order of the likelihood.
+    pub k_hat: Vec<f64>,
     /// Prediction of whole curves, each from all others.
     pub curves: Option<CurvesLeftOutFindings>,
 }

@@ -15,7 +15,7 @@ mod terminal;
 pub use crate::gap::report::power::power_text;
 pub use crate::page::table::Table;
 pub use coverage::{coverage_page, coverage_text};
-pub use page::render;
+pub use page::{page, render};
 pub use summary::{ByName, Key, Quantity, SCHEMA, Summary, keys, schema, schema_of, summary};
 pub use terminal::{gap_text, next_text, summary_text};
 

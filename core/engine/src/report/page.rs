@@ -4,10 +4,15 @@ use maud::{DOCTYPE, PreEscaped, html};
 
 use super::findings::Findings;
 use super::section;
-use crate::page::{Numbers, SCRIPT, STYLE};
+use crate::page::{FigureFile, Numbers, SCRIPT, style};
 
 /// The whole report as one HTML file.
 pub fn render(findings: &Findings) -> String {
+    page(findings).0
+}
+
+/// The whole report as one HTML file, and its figures as files.
+pub fn page(findings: &Findings) -> (String, Vec<FigureFile>) {
     let mut numbers = Numbers::default();
     let sections = section::all(findings, &mut numbers);
     let page = html! {
@@ -18,7 +23,7 @@ pub fn render(findings: &Findings) -> String {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="generator" content=(format!("Lacuna {}", findings.version));
                 title { (findings.title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(style())) }
             }
             body {
                 header {
@@ -45,5 +50,5 @@ pub fn render(findings: &Findings) -> String {
             }
         }
     };
-    page.into_string()
+    (page.into_string(), numbers.files())
 }

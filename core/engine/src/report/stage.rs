@@ -1,5 +1,8 @@
 //! Stage 8: results for people (`report.html`) and for scripts (`summary.json`).
 
+use std::fs;
+use std::path::Path;
+
 use lacuna::data::{Draws, Ensemble, Observations, Parameter};
 use lacuna::diagnose::Diagnosis;
 use lacuna::math::distribution::Distribution;
@@ -12,17 +15,20 @@ use lacuna_run::{Kept, RunDirectory, Stage};
 
 use crate::assess::Assessment;
 use crate::gap::result::{GapFindings, GapResult, added};
+use crate::page::FigureFile;
 use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, CurvesLeftOutFindings, EnsembleFindings,
     FieldFindings, Findings, FittedDistribution, LeftOutFindings, MeasuredFindings, Role, RunInput,
     SurrogateFindings,
 };
-use crate::report::{render, summary};
+use crate::report::{page, summary};
 use crate::screening::{Screening, screen};
 use crate::stage::artifacts::Artifacts;
 use crate::stage::calibrate::Calibrated;
+use crate::stage::drawn::drawn;
 use crate::stage::evidence::Weighed;
 use crate::stage::inverse_problem::InverseProblem;
+use crate::stage::mixing::mixing;
 use crate::stage::read::Measured;
 use crate::stage::validate::Validated;
 use crate::stage::{derived, fields};
@@ -51,13 +57,32 @@ pub fn stage(
     let findings = findings(study, results, calibrated, run, observer);
     let root = run.root();
     files::write_json(&root.join("summary.json"), &summary(&findings))?;
-    let page = render(&findings);
+    let (page, figures) = page(&findings);
     files::write_atomic(
         &run.stage_folder(&Stage::Report.folder()).join("report.html"),
         page.as_bytes(),
     )?;
+    write_figures(&root.join("figures"), &figures)?;
     files::write_atomic(&root.join("report.html"), page.as_bytes())?;
     Ok(findings)
+}
+
+/// Writes each figure as `NAME.svg` and `NAME.csv`, and removes those of figures that the report no longer has.
+fn write_figures(folder: &Path, figures: &[FigureFile]) -> Result<(), Stop> {
+    fs::create_dir_all(folder).map_err(|error| files::cannot_write(folder, &error))?;
+    for FigureFile { name, svg, csv } in figures {
+        files::write_atomic(&folder.join(format!("{name}.svg")), svg.as_bytes())?;
+        files::write_atomic(&folder.join(format!("{name}.csv")), csv.as_bytes())?;
+    }
+    let found = fs::read_dir(folder).map_err(|error| files::cannot_read(folder, &error))?;
+    for path in found.filter_map(|entry| Some(entry.ok()?.path())) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let stem = name.strip_suffix(".svg").or_else(|| name.strip_suffix(".csv"));
+        if stem.is_some_and(|stem| figures.iter().all(|figure| figure.name != stem)) {
+            fs::remove_file(&path).map_err(|error| files::cannot_write(&path, &error))?;
+        }
+    }
+    Ok(())
 }
 
 fn findings(
@@ -71,6 +96,9 @@ fn findings(
     let measured = all.measured();
     let weighed = all.weighed.map(|w| &w.value);
     let calibration = calibrated.map(|c| calibration(study, c, weighed));
+    let drawn = all.problem.zip(calibrated).and_then(|(problem, calibrated)| {
+        drawn(study, problem, &calibrated.draws.from_step(calibrated.outcome.burn_in))
+    });
     let validation =
         all.validated.zip(measured).map(|(kept, measured)| kept.value.findings(measured));
     let stage = |r: &Record| r.stage.split_once('-').map_or(&*r.stage, |s| s.1).to_owned();
@@ -98,6 +126,7 @@ fn findings(
         },
         assessment: results.assessed.value.clone(),
         calibration,
+        drawn,
         validation,
         quantities: all.quantities.map(|kept| kept.value.findings()).unwrap_or_default(),
         propagated: all.quantities.and_then(|kept| kept.value.propagated.clone()),
@@ -220,6 +249,8 @@ fn surrogate(
         by_group: errors.by_group.clone(),
         near_posterior: validated.and_then(|v| v.value.emulator_at_posterior),
         pairs: errors.pairs.clone(),
+        loo_by_output: errors.loo_by_output.clone(),
+        total_by_output: problem.emulator()?.sensitivity().map(|s| s.outputs.total),
         sobol,
     })
 }
@@ -237,7 +268,8 @@ fn calibration(
         Some(_) => Role::Hyperparameter,
     };
     let one = |j: usize| coordinate(calibrated, &kept, j, role(j));
-    let coordinates = (0..kept.dimension()).map(one).collect();
+    let coordinates: Vec<CoordinateFindings> = (0..kept.dimension()).map(one).collect();
+    let times: Vec<f64> = coordinates.iter().map(|c| c.autocorrelation_time).collect();
     CalibrationFindings {
         coordinates,
         draws: calibrated.draws.values.clone(),
@@ -251,6 +283,7 @@ fn calibration(
         verdict: verdict(&outcome.diagnosis),
         log_density: (outcome.map_log_density, outcome.best_draw.1),
         best_draw: outcome.best_draw.0.clone(),
+        mixing: mixing(&kept, &outcome.diagnosis.stranded.to_the_end, &times),
         facts: outcome.facts.clone(),
         populations: outcome.populations.clone(),
         evidence: weighed.and_then(|w| w.evidence.clone()),
@@ -262,6 +295,7 @@ fn calibration(
             unreliable: loo.unreliable,
             limit: loo.limit,
             count: loo.data.len(),
+            k_hat: loo.data.iter().map(|left| left.k_hat).collect(),
             curves: weighed.and_then(|w| w.curves_left_out.as_ref()).map(|curves| {
                 CurvesLeftOutFindings {
                     elpd: curves.elpd,

@@ -4,6 +4,7 @@ mod findings;
 
 use std::path::Path;
 
+use lacuna::data::measurements::Summary;
 use lacuna::data::{Draws, Observations};
 use lacuna::math::moments;
 use lacuna::math::random::{Stream, normal};
@@ -360,6 +361,19 @@ fn rmse(data: &Observations, response: &[f64]) -> f64 {
 }
 
 impl Validated {
+    /// Residuals of the first case, as [`ValidationFindings::residuals`] has them; empty without a case or a band.
+    fn residuals(&self, replicates: &[Summary]) -> Vec<f64> {
+        let (Some(case), Some((low, high))) = (self.cases.first(), &self.predictive) else {
+            return Vec::new();
+        };
+        let one = |(i, summary): (usize, &Summary)| {
+            let sd = (high[i] - low[i]) / (2.0 * Z975);
+            let is_known = summary.count > 0 && sd > 0.0;
+            if is_known { (summary.mean - case.response[i]) / sd } else { f64::NAN }
+        };
+        replicates.iter().enumerate().map(one).collect()
+    }
+
     /// Findings for the report.
     pub fn findings(&self, measured: &Measured) -> ValidationFindings {
         let replicates = measured.used.summaries();
@@ -369,6 +383,7 @@ impl Validated {
                 .iter()
                 .map(|s| (s.count, s.mean, s.sd().unwrap_or(0.0)))
                 .collect(),
+            residuals: self.residuals(&replicates),
             predictive: self.predictive.clone(),
             spread: self.spread.clone(),
         }

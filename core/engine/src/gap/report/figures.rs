@@ -1,6 +1,6 @@
 //! The figures of the gap.
 
-use maud::{Markup, html};
+use maud::Markup;
 
 use super::View;
 use crate::gap::report::sentences::on;
@@ -9,6 +9,7 @@ use crate::page::chart::{
     Axis, Band, Curve, Key, Panel, Row, Strip, residual_map, row_chart, small_multiples,
 };
 use crate::page::curves::{Curves, axis_unit};
+use crate::page::drawing::Drawing;
 use crate::page::number::{fixed, typeset};
 use crate::page::scale::{extent, padded};
 use crate::page::{Caption, Numbers};
@@ -50,7 +51,7 @@ pub fn maps(view: &View<'_>, result: &GapResult, numbers: &mut Numbers) -> Marku
         residual_map(&strips, &x, &format!("residual map {title}"))
     };
     let both = !result.additions.is_empty();
-    let drawings: Vec<String> = if both { vec![map(0), map(1)] } else { vec![map(0)] };
+    let drawings: Vec<Drawing> = if both { vec![map(0), map(1)] } else { vec![map(0)] };
     let shown = result.curves.len().min(MOST_CURVES);
     let further = match result.curves.len() - shown {
         0 => String::new(),
@@ -69,7 +70,7 @@ pub fn maps(view: &View<'_>, result: &GapResult, numbers: &mut Numbers) -> Marku
         "colour that stays with what was found; one sensor alone points at its chain, all sensors together at the \
          model.",
     );
-    numbers.figure(&drawings, &[], &caption)
+    numbers.figure("gap-residuals", &drawings, &[], &caption)
 }
 
 /// A line of a figure of curves: CSS class, name, label in the legend, and value at an output.
@@ -120,7 +121,7 @@ pub fn curves(view: &View<'_>, result: &GapResult, numbers: &mut Numbers) -> Mar
         "where the orange line leaves the blue one for the black one.",
     );
     let band = Edges { key: "a replicate's 95 % interval", at: &edges };
-    let title = "measured and simulated curves";
+    let title = ("gap-curves", "measured and simulated curves");
     figure(&outlines, &view.label(), &lines, &band, title, &caption, numbers)
 }
 
@@ -154,7 +155,7 @@ pub fn differences(view: &View<'_>, result: &GapResult, numbers: &mut Numbers) -
     );
     let key = "95 % interval of the replicates' mean, without emulator's error";
     let (band, outlines) = (Edges { key, at: &edges }, Curves::of(view.layouts));
-    let title = "measured less simulated curves";
+    let title = ("gap-differences", "measured less simulated curves");
     figure(&outlines, &view.label(), &lines, &band, title, &caption, numbers)
 }
 
@@ -164,7 +165,7 @@ fn figure(
     label: &str,
     lines: &[Line<'_>],
     band: &Edges<'_>,
-    title: &str,
+    (name, title): (&str, &str),
     caption: &Caption,
     numbers: &mut Numbers,
 ) -> Markup {
@@ -192,7 +193,7 @@ fn figure(
     let mut keys: Vec<Key> = lines.iter().map(|line| Key::line(line.class, line.key)).collect();
     keys.insert(1, Key::area("s-band", band.key));
     let drawings = small_multiples(&panels, &x, &y, title);
-    numbers.figure(&drawings, &keys, caption)
+    numbers.figure(name, &drawings, &keys, caption)
 }
 
 /// The placement with the largest evidence of each type.
@@ -224,5 +225,6 @@ pub fn leaders(step: &StepResult, numbers: &mut Numbers) -> Markup {
         "",
         "types within three of the best: these data cannot tell them apart.",
     );
-    html! { (numbers.figure(&[row_chart(&rows, "bar s-part", "candidates by evidence")], &[], &caption)) }
+    let drawing = row_chart(&rows, "bar s-part", "candidates by evidence");
+    numbers.figure("gap-candidates", &[drawing], &[], &caption)
 }

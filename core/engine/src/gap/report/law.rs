@@ -75,7 +75,8 @@ fn over_time(view: &View<'_>, law: &Law, numbers: &mut Numbers) -> Markup {
     if !law.terms.is_empty() {
         keys.push(Key::line("s-map", "law"));
     }
-    numbers.figure(&small_multiples(&panels, &x, &y, "the missing rate over time"), &keys, &caption)
+    let drawings = small_multiples(&panels, &x, &y, "the missing rate over time");
+    numbers.figure("gap-force-over-time", &drawings, &keys, &caption)
 }
 
 fn over_argument(law: &Law, of: &str, numbers: &mut Numbers) -> Markup {
@@ -112,7 +113,7 @@ fn over_argument(law: &Law, of: &str, numbers: &mut Numbers) -> Markup {
     );
     let keys = [Key::line("s-mean", "free force"), Key::line("s-map", "law")];
     let drawings = small_multiples(&panels, &x, &y, "the missing rate over its argument");
-    numbers.figure(&drawings, &keys, &caption)
+    numbers.figure("gap-force", &drawings, &keys, &caption)
 }
 
 /// The range of all curves.

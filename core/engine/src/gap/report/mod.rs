@@ -4,6 +4,7 @@ mod figures;
 mod insight;
 mod law;
 pub mod next;
+mod picture;
 pub mod power;
 mod proof;
 pub mod reliability;
@@ -48,6 +49,7 @@ pub fn section(view: &View<'_>, gap: &GapFindings, numbers: &mut Numbers) -> Sec
         @if !result.verdict.reasons.is_empty() {
             ul { @for reason in &result.verdict.reasons { li { (paragraph(reason)) } } }
         }
+        (picture::figure(view, result, numbers))
         @if !gap.held_out().is_empty() {
             (tables::held_out(gap, numbers))
             (tables::scores(view, gap, numbers))

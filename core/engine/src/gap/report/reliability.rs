@@ -7,7 +7,7 @@ use crate::gap::search::{Bin, Brier, Reliability};
 use crate::page::chart::{Axis, Band, Curve, Key, Panel, small_multiples};
 use crate::page::number::{fixed, percent};
 use crate::page::table::Table;
-use crate::page::{Caption, Numbers, SCRIPT, STYLE, paragraph};
+use crate::page::{Caption, Numbers, SCRIPT, paragraph, style};
 
 /// The reliability of the printed and of the posterior probabilities as a table for the terminal; `None` without names.
 pub fn reliability_text(rates: &Rates) -> Option<String> {
@@ -84,7 +84,8 @@ pub fn figure(panels: &[(&str, &Reliability)], numbers: &mut Numbers) -> Markup 
         "counts of cases (Clopper and Pearson's interval).",
         "a line below the dashed one: names are less often right than was told.",
     );
-    numbers.figure(&small_multiples(&panels, &x, &y, "reliability"), &keys, &caption)
+    let drawings = small_multiples(&panels, &x, &y, "reliability");
+    numbers.figure("reliability-of-names", &drawings, &keys, &caption)
 }
 
 /// The page of a study's power: its rates as they are printed, and the reliability of its probabilities.
@@ -99,7 +100,7 @@ pub fn power_page(title: &str, rates: &Rates) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (heading) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(style())) }
             }
             body {
                 header { p.kicker { "Lacuna · power" } h1 { (heading) } }

@@ -1,6 +1,7 @@
 //! Vertical bars, single or grouped, over names or numbers.
 
-use super::{Axis, Frame, WIDTH};
+use super::{Axis, Frame};
+use crate::page::drawing::{Datum, Drawing};
 use crate::page::number::{fixed, significant, typeset};
 use crate::page::svg::{Anchor, Area, Svg};
 
@@ -46,17 +47,45 @@ pub struct BarChart {
 }
 
 impl BarChart {
-    /// Draws the chart; `description` is the text for readers who do not see it.
-    pub fn draw(&self, description: &str) -> String {
+    /// Draws the chart; `description` is the text for readers who do not see it, to which the highest and the lowest
+    /// bar are added.
+    pub fn draw(&self, description: &str) -> Drawing {
+        let words = format!("{description}: {}", self.in_words());
+        let values = self.series.iter().flat_map(|series| {
+            let each = self.names.iter().zip(&series.values);
+            each.map(|(name, value)| Datum::named("", &series.name, name, *value))
+        });
+        let labels = [self.x_label.as_str(), self.y.label.as_str()];
+        Drawing::wide(|width| self.sized(width, &words), labels, values.collect())
+    }
+
+    /// The highest and the lowest bar of each series.
+    fn in_words(&self) -> String {
+        let one = |series: &BarSeries| {
+            let known = || {
+                let each = self.names.iter().zip(&series.values);
+                each.filter(|(_, value)| value.is_finite())
+            };
+            let by_value = |a: &(&String, &f64), b: &(&String, &f64)| a.1.total_cmp(b.1);
+            let (low, high) = (known().min_by(by_value)?, known().max_by(by_value)?);
+            let [low, high] = [low, high]
+                .map(|(name, value)| format!("{} at {name}", typeset(&significant(*value, 3))));
+            Some(format!("{} from {low} to {high}", series.name))
+        };
+        self.series.iter().filter_map(one).collect::<Vec<_>>().join("; ")
+    }
+
+    fn sized(&self, width: f64, description: &str) -> String {
         let height = 250.0;
-        let area = Area::new(60.0, 20.0, WIDTH - 76.0, height - 64.0);
+        let area = Area::new(60.0, 20.0, width - 70.0, height - 64.0);
         let x = Axis::new(self.x_label.as_str(), (0.0, self.names.len().max(1) as f64)).ticks(0);
         let frame = Frame::new(area, &x, &self.y);
-        let mut svg = Svg::new(WIDTH, height);
+        let mut svg = Svg::new(width, height);
         frame.axes(&mut svg, &x, &self.y);
         self.draw_names(&mut svg, &frame);
-        svg.clipped(area, |svg| self.draw_bars(svg, &frame));
-        if self.numbers {
+        frame.inside(&mut svg, &x, &self.y, |svg| self.draw_bars(svg, &frame));
+        // A number over a bar takes about five letters.
+        if self.numbers && self.slot(&frame) > 34.0 * self.series.len() as f64 {
             self.draw_numbers(&mut svg, &frame);
         }
         for level in self.levels.iter().filter(|l| l.value.is_finite()) {
@@ -104,7 +133,9 @@ impl BarChart {
                 let hint = format!("{} {name}: {value}", series.name);
                 let outstanding = if self.outstanding.contains(&i) { " outstanding" } else { "" };
                 let class = format!("bar {}{outstanding}", series.class);
-                svg.rectangle(&class, area, hint.trim_start());
+                // Bars that are narrower than a pixel cannot be pointed at.
+                let hint = if area.width < 1.0 { "" } else { hint.trim_start() };
+                svg.rectangle(&class, area, hint);
             }
         }
     }

@@ -4,6 +4,7 @@ use super::scatter::dots;
 use super::triangle::{Cell, triangle};
 use super::{Axis, Frame};
 use crate::page::curve::Histogram;
+use crate::page::drawing::{Datum, Drawing};
 use crate::page::scale::{extent, padded};
 use crate::page::svg::{Anchor, Area, Svg};
 
@@ -31,15 +32,26 @@ pub fn design_matrix(
     columns: &[DesignColumn],
     classes: &DesignPoints,
     description: &str,
-) -> String {
+) -> Drawing {
     let n = columns.len().min(MOST_CROSSED);
     let axes: Vec<Axis> = columns[..n].iter().map(axis).collect();
-    triangle(&axes, description, |svg, cell| match cell {
+    let listed = |column: &DesignColumn| {
+        let each = column.values.iter().enumerate();
+        let run = |(i, value): (usize, &f64)| {
+            Datum::point(&column.label, "run", (i as f64 + 1.0, *value))
+        };
+        each.map(run).collect::<Vec<_>>()
+    };
+    let values = columns[..n].iter().flat_map(listed).collect();
+    let svg = triangle(&axes, description, |svg, cell| match cell {
         Cell::Diagonal { index, area, shown } => {
             draw_diagonal(svg, area, &columns[index], &axes[index], &shown);
         }
-        Cell::Pair { x, y, frame } => draw_pair(svg, &frame, (&columns[x], &columns[y]), classes),
-    })
+        Cell::Pair { x, y, frame } => frame.inside(svg, &axes[x], &axes[y], |svg| {
+            draw_pair(svg, &frame, (&columns[x], &columns[y]), classes);
+        }),
+    });
+    Drawing::scrolled(svg, ["number of the run", "value"], values)
 }
 
 fn axis(column: &DesignColumn) -> Axis {
@@ -62,17 +74,15 @@ fn draw_pair(
     (x, y): (&DesignColumn, &DesignColumn),
     classes: &DesignPoints,
 ) {
-    svg.clipped(frame.area, |svg| {
-        for (class, runs) in classes {
-            let points: Vec<_> = runs.iter().map(|&i| (x.values[i], y.values[i])).collect();
-            svg.path(class, &dots(frame, &points), "");
-        }
-        if let (Some(x), Some(y)) = (x.prior, y.prior) {
-            let (left, top) = frame.at((x.0, y.1));
-            let (right, bottom) = frame.at((x.1, y.0));
-            svg.rectangle("s-box", Area::new(left, top, right - left, bottom - top), "");
-        }
-    });
+    for (class, runs) in classes {
+        let points: Vec<_> = runs.iter().map(|&i| (x.values[i], y.values[i])).collect();
+        svg.path(class, &dots(frame, &points), if *class == "s-run" { "run" } else { "" });
+    }
+    if let (Some(x), Some(y)) = (x.prior, y.prior) {
+        let (left, top) = frame.at((x.0, y.1));
+        let (right, bottom) = frame.at((x.1, y.0));
+        svg.rectangle("s-box", Area::new(left, top, right - left, bottom - top), "");
+    }
 }
 
 fn draw_diagonal(svg: &mut Svg, area: Area, column: &DesignColumn, domain: &Axis, shown: &Axis) {

@@ -1,7 +1,9 @@
 //! Marginal distributions: histogram, prior, fitted distribution, and marks.
 
-use super::{Axis, Curve, Frame, WIDTH};
+use super::{Axis, Curve, Frame, PANEL, shortened};
 use crate::page::curve::Histogram;
+use crate::page::drawing::{Datum, Drawing};
+use crate::page::number::{significant, typeset};
 use crate::page::scale::{Scale, extent, padded};
 use crate::page::svg::{Anchor, Area, Path, Svg};
 
@@ -50,52 +52,63 @@ pub struct Marginal {
     pub second: Option<SecondAxis>,
 }
 
-const LEFT: f64 = 62.0;
-const GAP: f64 = 76.0;
-const TOP: f64 = 26.0;
+const LEFT: f64 = 64.0;
+const TOP: f64 = 40.0;
 /// Height reserved for the second axis.
 const SECOND: f64 = 32.0;
-const ROW: f64 = 236.0;
-const BOTTOM: f64 = 44.0;
+const HEIGHT: f64 = 240.0;
+const BOTTOM: f64 = 38.0;
 
-/// Number of rows in one drawing; further rows start a new drawing, so that each fits on a sheet of paper.
-const SHEET_ROWS: usize = 3;
-
-/// Draws panels of marginal distributions, two per row, each with its own axes; returns one drawing per sheet.
-pub fn marginals(panels: &[Marginal], description: &str) -> Vec<String> {
-    panels.chunks(2 * SHEET_ROWS).map(|panels| sheet(panels, description)).collect()
-}
-
-fn sheet(panels: &[Marginal], description: &str) -> String {
-    let columns = panels.len().clamp(1, 2);
-    let rows = panels.len().div_ceil(columns);
-    let width = (WIDTH - LEFT - 10.0 - (columns - 1) as f64 * GAP) / columns as f64;
+/// Draws panels of marginal distributions, each with its own axes.
+pub fn marginals(panels: &[Marginal], description: &str) -> Vec<Drawing> {
     let second = if panels.iter().any(|p| p.second.is_some()) { SECOND } else { 0.0 };
-    let row_height = ROW + second;
-    let mut svg = Svg::new(WIDTH, rows as f64 * row_height);
-    for (i, panel) in panels.iter().enumerate() {
-        let left = LEFT + (i % columns) as f64 * (width + GAP);
-        let top = (i / columns) as f64 * row_height + TOP + second;
-        draw(&mut svg, panel, Area::new(left, top, width, ROW - TOP - BOTTOM));
-    }
-    svg.finish(description)
+    panels.iter().map(|panel| one(panel, second, description)).collect()
 }
 
-fn draw(svg: &mut Svg, panel: &Marginal, area: Area) {
+/// One panel; `second` is the height that the figure reserves for second axes.
+fn one(panel: &Marginal, second: f64, description: &str) -> Drawing {
     let histogram = Histogram::of(&panel.draws, 60);
-    let domain = histogram.as_ref().and_then(|h| extent(h.bins().flat_map(|(l, r, _)| [l, r])));
+    let mut svg = Svg::new(PANEL, HEIGHT + second);
+    let top = TOP + second;
+    draw(
+        &mut svg,
+        panel,
+        histogram.as_ref(),
+        Area::new(LEFT, top, PANEL - LEFT - 10.0, HEIGHT - TOP - BOTTOM),
+    );
+    let bins = histogram.iter().flat_map(Histogram::bins);
+    let values = bins.map(|(left, right, density)| {
+        Datum::point(&panel.title, "histogram", (0.5 * (left + right), density))
+    });
+    let curves = panel.curves.iter().flat_map(|curve| {
+        curve.points.iter().map(|&point| Datum::point(&panel.title, &curve.name, point))
+    });
+    let marks: Vec<&str> = panel.marks.iter().map(|mark| mark.label.as_str()).collect();
+    let sorted = crate::page::curve::sorted(&panel.draws);
+    let [low, middle, high] = [0.025, 0.5, 0.975]
+        .map(|p| typeset(&significant(crate::page::curve::quantile(&sorted, p), 3)));
+    let words = format!(
+        "{description}, {}: median {middle}, 95 % of the draws from {low} to {high}; {}",
+        panel.label,
+        marks.join(", ")
+    );
+    let values = values.chain(curves).collect();
+    Drawing::panel(svg.finish(&words), [&panel.label, &panel.density_label], values)
+}
+
+fn draw(svg: &mut Svg, panel: &Marginal, histogram: Option<&Histogram>, area: Area) {
+    let bins = || histogram.into_iter().flat_map(Histogram::bins);
+    let domain = extent(bins().flat_map(|(l, r, _)| [l, r]));
     let domain = padded(domain.unwrap_or((0.0, 1.0)), 0.12);
-    let densities = histogram.iter().flat_map(|h| h.density.iter().copied());
-    let highest = densities.fold(0.0, f64::max);
-    let x = Axis::new(panel.label.as_str(), domain);
+    let highest = bins().map(|(_, _, density)| density).fold(0.0, f64::max);
+    let x = Axis::new(panel.label.as_str(), domain).ticks(4);
     let y = Axis::new(panel.density_label.as_str(), (0.0, 1.15 * highest)).ticks(4);
     let frame = Frame::new(area, &x, &y);
-    let title_y = area.y - 9.0 - if panel.second.is_some() { SECOND } else { 0.0 };
-    svg.text("panel-title", (area.x, title_y), Anchor::Start, &panel.title);
-    svg.text("remark", (area.right(), title_y), Anchor::End, &panel.remark);
+    svg.text("panel-title", (1.0, 13.0), Anchor::Start, &shortened(&panel.title, 46));
+    svg.text("remark", (area.right(), 29.0), Anchor::End, &panel.remark);
     frame.axes(svg, &x, &y);
     frame.inside(svg, &x, &y, |svg| {
-        for (left, right, density) in histogram.iter().flat_map(Histogram::bins) {
+        for (left, right, density) in bins() {
             let (x0, y0) = frame.at((left, density));
             let (x1, y1) = frame.at((right, 0.0));
             svg.rectangle("s-histogram", Area::new(x0, y0, x1 - x0, y1 - y0), "");
@@ -104,11 +117,11 @@ fn draw(svg: &mut Svg, panel: &Marginal, area: Area) {
             let path = Path::through(frame.along(&curve.points));
             svg.path(&format!("line {}", curve.class), &path, &curve.name);
         }
+        draw_marks(svg, &frame, &panel.marks);
     });
     if let Some(second) = &panel.second {
-        draw_second(svg, &frame, second);
+        svg.group(&[("class", "second")], |svg| draw_second(svg, &frame, second));
     }
-    draw_marks(svg, &frame, &panel.marks);
 }
 
 /// Vertical lines with labels at staggered heights; an arrow at the edge marks a value beyond it.

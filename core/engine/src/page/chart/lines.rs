@@ -1,6 +1,7 @@
 //! Curves with bands as small multiples on shared axes: one panel per sensor.
 
-use super::{Axis, Frame, WIDTH, drawable};
+use super::{Axis, Frame, PANEL, drawable, extremes_in_words, shortened};
+use crate::page::drawing::{Datum, Drawing};
 use crate::page::svg::{Anchor, Area, Path, Svg};
 
 /// Area between two curves.
@@ -37,38 +38,76 @@ pub struct Panel {
 }
 
 const LEFT: f64 = 60.0;
-const GAP: f64 = 20.0;
 const TOP: f64 = 22.0;
-const BOTTOM: f64 = 34.0;
+const BOTTOM: f64 = 38.0;
 
-/// Number of rows in one drawing; further rows start a new drawing, so that each fits on a sheet of paper.
-const SHEET_ROWS: usize = 6;
+/// Approximate width of a letter of an axis label.
+const LETTER: f64 = 6.4;
 
-/// Draws panels in a grid, all with the same axes, so that amplitudes can be compared; returns one drawing per sheet.
-pub fn small_multiples(panels: &[Panel], x: &Axis, y: &Axis, description: &str) -> Vec<String> {
-    panels.chunks(2 * SHEET_ROWS).map(|panels| sheet(panels, x, y, description)).collect()
+/// Largest number of letters of title and remark on one line of a panel.
+const LETTERS: usize = 46;
+
+/// Draws panels with the same axes, so that amplitudes can be compared; a single panel takes the full width.
+pub fn small_multiples(panels: &[Panel], x: &Axis, y: &Axis, description: &str) -> Vec<Drawing> {
+    let letters = |p: &Panel| p.title.chars().count() + p.remark.chars().count();
+    let wrapped = panels.iter().any(|p| letters(p) > LETTERS);
+    let one = |panel: &Panel| {
+        let words = in_words(panel, (x, y), description);
+        let draw = |width: f64| {
+            let height = if width > PANEL { 250.0 } else { 190.0 };
+            // A label is written upwards beside the axis.
+            let tall = LETTER * y.label.chars().count() as f64 + TOP + BOTTOM;
+            let height = f64::max(height, tall.min(320.0));
+            let top = if wrapped && width == PANEL { TOP + 15.0 } else { TOP };
+            let mut svg = Svg::new(width, height + top - TOP);
+            let area = Area::new(LEFT, top, width - LEFT - 10.0, height - TOP - BOTTOM);
+            let most = if width > PANEL { x.ticks } else { x.ticks.min(5) };
+            let x = x.clone().ticks(most);
+            let frame = Frame::new(area, &x, y);
+            frame.axes(&mut svg, &x, y);
+            self::draw(&mut svg, panel, &frame, (&x, y));
+            svg.finish(&words)
+        };
+        let labels = [x.label.as_str(), y.label.as_str()];
+        if panels.len() == 1 {
+            Drawing::wide(draw, labels, values(panel))
+        } else {
+            Drawing::panel(draw(PANEL), labels, values(panel))
+        }
+    };
+    panels.iter().map(one).collect()
 }
 
-fn sheet(panels: &[Panel], x: &Axis, y: &Axis, description: &str) -> String {
-    let columns = if panels.len() == 1 { 1 } else { 2 };
-    let rows = panels.len().div_ceil(columns);
-    let row_height = if rows == 1 { 250.0 } else { 142.0 };
-    let width = (WIDTH - LEFT - 10.0 - (columns - 1) as f64 * GAP) / columns as f64;
-    let mut svg = Svg::new(WIDTH, rows as f64 * row_height + BOTTOM);
-    for (i, panel) in panels.iter().enumerate() {
-        let (row, column) = (i / columns, i % columns);
-        let left = LEFT + column as f64 * (width + GAP);
-        let area = Area::new(left, row as f64 * row_height + TOP, width, row_height - TOP - 4.0);
-        let frame = Frame::new(area, x, y);
-        frame.axes(&mut svg, &x.shown(i + columns >= panels.len()), &y.shown(column == 0));
-        draw(&mut svg, panel, &frame, (x, y));
-    }
-    svg.finish(description)
+/// A panel in a sentence: its title and remark, and the range of its last named curve.
+fn in_words(panel: &Panel, axes: (&Axis, &Axis), description: &str) -> String {
+    let named = panel.curves.iter().rev().find(|c| !c.name.is_empty() && drawable(&c.points));
+    let range = named.map(|c| format!("{} {}", c.name, extremes_in_words(&c.points, axes)));
+    let said = [Some(panel.remark.clone()), range].into_iter().flatten();
+    let said: Vec<String> = said.filter(|text| !text.is_empty()).collect();
+    let said = if said.is_empty() { "nothing measured".to_owned() } else { said.join("; ") };
+    format!("{description}, {}: {said}", panel.title)
+}
+
+/// The drawn values.
+fn values(panel: &Panel) -> Vec<Datum> {
+    let curves = panel.curves.iter().flat_map(|curve| {
+        let name = if curve.name.is_empty() { curve.class } else { &curve.name };
+        let name = name.trim_start_matches("s-");
+        curve.points.iter().map(move |&point| Datum::point(&panel.title, name, point))
+    });
+    let bands = panel.bands.iter().flat_map(|band| {
+        let name = band.class.trim_start_matches("s-");
+        band.edges.iter().map(move |&(x, low, high)| Datum {
+            interval: Some((low, high)),
+            ..Datum::point(&panel.title, name, (x, f64::NAN))
+        })
+    });
+    curves.chain(bands).collect()
 }
 
 fn draw(svg: &mut Svg, panel: &Panel, frame: &Frame, (x, y): (&Axis, &Axis)) {
     let area = frame.area;
-    svg.text("panel-title", (area.x + 1.0, area.y - 6.0), Anchor::Start, &panel.title);
+    svg.text("panel-title", (1.0, 14.0), Anchor::Start, &shortened(&panel.title, LETTERS));
     svg.text("remark", (area.right() - 1.0, area.y - 6.0), Anchor::End, &panel.remark);
     if !panel.curves.iter().any(|c| drawable(&c.points)) {
         let middle = (area.x + 0.5 * area.width, area.y + 0.5 * area.height);

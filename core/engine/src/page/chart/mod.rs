@@ -12,6 +12,7 @@ mod scatter;
 mod trace;
 mod triangle;
 
+use super::number::{significant, typeset};
 use super::scale::Scale;
 use super::svg::{Anchor, Area, Svg};
 
@@ -23,11 +24,15 @@ pub use lines::{Band, Curve, Panel, small_multiples};
 pub use pairs::{MOST_PAIRED, PairColumn, pair_matrix};
 pub use residual_map::{Strip, residual_map};
 pub use rows::{Row, row_chart};
-pub use scatter::agreement;
+pub use scatter::{agreement, dot_chart};
 pub use trace::{Trace, traces};
 
-/// Width of every figure in its own units; the page scales it to the width of the column.
+/// Width of a drawing over the full width of the page, in its own units. Screens show a unit as about a pixel, so that
+/// letters stay readable.
 pub const WIDTH: f64 = 880.0;
+
+/// Width of a panel, that of a phone's screen; three stand beside each other on a wide one.
+pub const PANEL: f64 = 340.0;
 
 /// Label, range and ticks of an axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,20 +110,24 @@ impl Frame {
     pub fn axes(&self, svg: &mut Svg, x: &Axis, y: &Axis) {
         let Area { x: left, y: top, .. } = self.area;
         let (right, bottom) = (self.area.right(), self.area.bottom());
-        for tick in ticks(&self.y, y.ticks) {
-            let place = self.y.place(tick.value);
-            svg.line("grid", (left, place), (right, place));
-            if y.numbers {
-                svg.text("tick", (left - 5.0, place + 3.6), Anchor::End, &tick.label);
+        svg.group(&[("class", "y-ticks")], |svg| {
+            for tick in ticks(&self.y, y.ticks) {
+                let place = self.y.place(tick.value);
+                svg.line("grid", (left, place), (right, place));
+                if y.numbers {
+                    svg.text("tick", (left - 5.0, place + 3.6), Anchor::End, &tick.label);
+                }
             }
-        }
-        for tick in ticks(&self.x, x.ticks) {
-            let place = self.x.place(tick.value);
-            svg.line("grid", (place, top), (place, bottom));
-            if x.numbers {
-                svg.text("tick", (place, bottom + 14.0), Anchor::Middle, &tick.label);
+        });
+        svg.group(&[("class", "x-ticks")], |svg| {
+            for tick in ticks(&self.x, x.ticks) {
+                let place = self.x.place(tick.value);
+                svg.line("grid", (place, top), (place, bottom));
+                if x.numbers {
+                    svg.text("tick", (place, bottom + 14.0), Anchor::Middle, &tick.label);
+                }
             }
-        }
+        });
         svg.rectangle("frame", self.area, "");
         let middle = (left + 0.5 * self.area.width, top + 0.5 * self.area.height);
         if !x.label.is_empty() {
@@ -136,12 +145,14 @@ impl Frame {
         let (bottom, top) = (self.area.bottom(), self.area.y);
         let across = describe((left, right), &self.x);
         let along = describe((bottom, top), &self.y);
+        let counts = format!("{} {}", x.ticks, if y.numbers { y.ticks } else { 0 });
         let attributes = [
             ("class", "plot"),
             ("data-x", across.as_str()),
             ("data-y", along.as_str()),
             ("data-x-label", x.label.as_str()),
             ("data-y-label", y.label.as_str()),
+            ("data-ticks", counts.as_str()),
         ];
         svg.group(&attributes, |svg| {
             svg.rectangle("hit", self.area, "");
@@ -157,7 +168,8 @@ fn ticks(scale: &Scale, count: usize) -> Vec<crate::page::scale::Tick> {
 /// A scale for the page's script: two coordinates of the drawing, and the values there.
 fn describe(range: (f64, f64), scale: &Scale) -> String {
     let domain = scale.domain();
-    format!("{} {} {:e} {:e}", range.0, range.1, domain.0, domain.1)
+    let kind = if scale.is_logarithmic() { " log" } else { "" };
+    format!("{} {} {:e} {:e}{kind}", range.0, range.1, domain.0, domain.1)
 }
 
 /// Appearance of a legend entry.
@@ -169,6 +181,17 @@ pub enum Swatch {
     Area,
     /// A dot.
     Dot,
+}
+
+impl Swatch {
+    /// Name by which the page's script knows the appearance.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Line => "line",
+            Self::Area => "area",
+            Self::Dot => "dot",
+        }
+    }
 }
 
 /// Entry of the legend of a figure; it has the CSS class of the shapes that it names.
@@ -202,4 +225,33 @@ impl Key {
 /// Returns true if at least one point is finite.
 fn drawable(points: &[(f64, f64)]) -> bool {
     points.iter().any(|(x, y)| x.is_finite() && y.is_finite())
+}
+
+/// A title shortened to the width of a panel.
+fn shortened(text: &str, letters: usize) -> String {
+    if text.chars().count() <= letters {
+        return text.to_owned();
+    }
+    text.chars().take(letters.saturating_sub(1)).chain(['…']).collect()
+}
+
+/// A sentence on the largest and the smallest value of a curve and where they are; empty if it has none.
+fn extremes_in_words(points: &[(f64, f64)], (x, y): (&Axis, &Axis)) -> String {
+    let known = || points.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
+    let by_value = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+    let (Some(low), Some(high)) = (known().min_by(by_value), known().max_by(by_value)) else {
+        return String::new();
+    };
+    let words = |label: &str, value: f64| with_unit(label, &typeset(&significant(value, 3)));
+    let [low, high] =
+        [low, high].map(|p| format!("{} at {}", words(&y.label, p.1), words(&x.label, p.0)));
+    format!("from {low} to {high}")
+}
+
+/// A number with the name and the unit of an axis, such as `time 0.35 ms`.
+fn with_unit(label: &str, number: &str) -> String {
+    match label.strip_suffix(']').and_then(|label| label.rsplit_once(" [")) {
+        Some((name, unit)) => format!("{name} {number} {unit}"),
+        None => format!("{label} {number}"),
+    }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::triangle::{Cell, triangle};
 use super::{Axis, Frame, Mark};
 use crate::page::curve::{quantile, smooth_density, sorted};
+use crate::page::drawing::{Datum, Drawing};
 use crate::page::scale::{extent, padded};
 use crate::page::svg::{Anchor, Area, Path, Svg};
 
@@ -28,19 +29,37 @@ pub const MOST_PAIRED: usize = 6;
 const SHADES: usize = 6;
 
 /// Draws all pairs of coordinates below the diagonal.
-pub fn pair_matrix(columns: &[PairColumn], description: &str) -> String {
+pub fn pair_matrix(columns: &[PairColumn], description: &str) -> Drawing {
     let n = columns.len().min(MOST_PAIRED);
     let axes: Vec<Axis> = columns[..n].iter().map(axis).collect();
-    triangle(&axes, description, |svg, cell| match cell {
+    let thinned = |column: &PairColumn| {
+        let stride = column.draws.len().div_ceil(MOST_LISTED).max(1);
+        let each = column.draws.iter().enumerate().step_by(stride);
+        let number =
+            |(i, value): (usize, &f64)| Datum::point(&column.label, "draw", (i as f64, *value));
+        each.map(number).collect::<Vec<_>>()
+    };
+    let values = columns[..n].iter().flat_map(thinned).collect();
+    let svg = triangle(&axes, description, |svg, cell| match cell {
         Cell::Diagonal { index, area, shown } => {
             draw_density(svg, area, &columns[index], &axes[index], &shown);
         }
-        Cell::Pair { x, y, frame } => svg.clipped(frame.area, |svg| {
-            draw_hexagons(svg, &frame, &columns[x].draws, &columns[y].draws);
-            draw_marks(svg, &frame, &columns[x].marks, &columns[y].marks);
-        }),
-    })
+        Cell::Pair { x, y, frame } => {
+            let places = [x.to_string(), y.to_string()];
+            let attributes = [("data-column", places[0].as_str()), ("data-row", &places[1])];
+            svg.group(&attributes, |svg| {
+                frame.inside(svg, &axes[x], &axes[y], |svg| {
+                    draw_hexagons(svg, &frame, &columns[x].draws, &columns[y].draws);
+                    draw_marks(svg, &frame, &columns[x].marks, &columns[y].marks);
+                });
+            });
+        }
+    });
+    Drawing::scrolled(svg, ["number of the draw", "value"], values)
 }
+
+/// Approximate number of draws of a coordinate that are listed in the table of values.
+const MOST_LISTED: usize = 1000;
 
 /// Axis over all but the outermost 0.1 % of the draws, so that a few stray draws do not shrink the rest.
 fn axis(column: &PairColumn) -> Axis {
@@ -88,7 +107,7 @@ fn draw_marks(svg: &mut Svg, frame: &Frame, across: &[Mark], along: &[Mark]) {
 /// The nearest point of two interleaved rectangular lattices is the nearest centre of a hexagonal lattice (Carr,
 /// Littlefield, Nicholson and Littlefield, JASA 82, 1987).
 fn draw_hexagons(svg: &mut Svg, frame: &Frame, x: &[f64], y: &[f64]) {
-    let width = frame.area.width / 26.0;
+    let width = frame.area.width / 22.0;
     let height = width * 3.0_f64.sqrt();
     let mut counts: BTreeMap<(i64, i64, bool), usize> = BTreeMap::new();
     for point in x.iter().zip(y).map(|(&x, &y)| frame.at((x, y))) {

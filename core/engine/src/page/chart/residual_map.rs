@@ -1,7 +1,8 @@
 //! Residuals along curves as coloured strips, one per curve, with outlined intervals.
 
-use super::{Axis, Frame, WIDTH};
-use crate::page::number::{fixed, typeset};
+use super::{Axis, Frame, PANEL, shortened, with_unit};
+use crate::page::drawing::{Datum, Drawing};
+use crate::page::number::{fixed, significant, typeset};
 use crate::page::svg::{Anchor, Area, Svg};
 
 /// One strip of the map.
@@ -24,18 +25,37 @@ const CELLS: usize = 120;
 const STEP: f64 = 1.2;
 
 /// Draws the map; blue is positive, red negative, and the darkest colour stands for values of six or more.
-pub fn residual_map(strips: &[Strip], x: &Axis, description: &str) -> String {
+pub fn residual_map(strips: &[Strip], x: &Axis, description: &str) -> Drawing {
+    let all = || strips.iter().flat_map(|strip| strip.points.iter().map(move |p| (strip, p)));
+    let known = all().filter(|(_, p)| p.1.is_finite());
+    let largest = known.max_by(|a, b| a.1.1.abs().total_cmp(&b.1.1.abs()));
+    let said = largest.map_or_else(String::new, |(strip, &(at, value))| {
+        let at = with_unit(&x.label, &typeset(&significant(at, 3)));
+        format!(": the largest is {} at {}, {at}", typeset(&fixed(value, 1)), strip.name)
+    });
+    let words = format!("{description}{said}");
+    let values =
+        all().map(|(strip, &point)| Datum::point(&strip.name, "residual", point)).collect();
+    let labels = [x.label.as_str(), "residual [standard deviations]"];
+    Drawing::wide(|width| sized(strips, x, width, &words), labels, values)
+}
+
+fn sized(strips: &[Strip], x: &Axis, width: f64, description: &str) -> String {
+    let names = if width > PANEL { NAMES } else { 78.0 };
+    let most = if width > PANEL { CELLS } else { CELLS / 2 };
     let height = strips.len() as f64 * HEIGHT;
-    let area = Area::new(NAMES, 6.0, WIDTH - NAMES - 12.0, height);
+    let area = Area::new(names, 6.0, width - names - 12.0, height);
     let y = Axis::new("", (0.0, strips.len().max(1) as f64)).ticks(0);
+    let x = &x.clone().ticks(if width > PANEL { x.ticks } else { x.ticks.min(4) });
     let frame = Frame::new(area, x, &y);
-    let mut svg = Svg::new(WIDTH, height + 46.0);
+    let mut svg = Svg::new(width, height + 46.0);
     frame.axes(&mut svg, x, &y);
     let longest = strips.iter().map(|strip| strip.points.len()).max().unwrap_or(0);
-    let cells = longest.clamp(1, CELLS);
+    let cells = longest.clamp(1, most);
     for (i, strip) in strips.iter().enumerate() {
         let top = area.y + i as f64 * HEIGHT;
-        svg.text("tick", (NAMES - 8.0, top + 0.5 * HEIGHT + 4.0), Anchor::End, &strip.name);
+        let name = shortened(&strip.name, ((names - 8.0) / 6.4) as usize);
+        svg.text("tick", (names - 8.0, top + 0.5 * HEIGHT + 4.0), Anchor::End, &name);
         let width = area.width / cells as f64;
         for (k, value) in extremes(strip, x.domain, cells).into_iter().enumerate() {
             let Some((at, value)) = value else { continue };
@@ -43,7 +63,7 @@ pub fn residual_map(strips: &[Strip], x: &Axis, description: &str) -> String {
             let hint = format!(
                 "{}, {}: {}",
                 strip.name,
-                typeset(&crate::page::number::significant(at, 3)),
+                with_unit(&x.label, &typeset(&significant(at, 3))),
                 typeset(&fixed(value, 1))
             );
             svg.rectangle(&format!("strip {}", shade(value)), cell, &hint);

@@ -1,7 +1,9 @@
 //! Traces of many chains, with the marginal density beside them on the same vertical axis.
 
-use super::{Axis, Frame, Mark, WIDTH};
-use crate::page::curve::smooth_density;
+use super::{Axis, Frame, Mark, PANEL, shortened};
+use crate::page::curve::{quantile, smooth_density, sorted};
+use crate::page::drawing::{Datum, Drawing};
+use crate::page::number::{significant, typeset};
 use crate::page::scale::{extent, padded};
 use crate::page::svg::{Anchor, Area, Path, Svg};
 
@@ -14,6 +16,8 @@ pub struct Trace {
     pub label: String,
     /// Values of each chain at the steps of [`Trace::steps`].
     pub chains: Vec<Vec<f64>>,
+    /// Number of each chain, from zero.
+    pub numbers: Vec<usize>,
     /// One entry per chain, true if the chain is stranded.
     pub stranded: Vec<bool>,
     /// Steps at which the values were taken.
@@ -30,28 +34,39 @@ pub struct Trace {
 
 const LEFT: f64 = 66.0;
 const TOP: f64 = 24.0;
-const ROW: f64 = 176.0;
+const HEIGHT: f64 = 200.0;
 const BOTTOM: f64 = 38.0;
-const SIDE: f64 = 150.0;
-const GAP: f64 = 12.0;
+/// Width of the density beside a trace.
+const SIDE: f64 = 64.0;
+const GAP: f64 = 8.0;
 
-/// Number of rows in one drawing; further rows start a new drawing, so that each fits on a sheet of paper.
-const SHEET_ROWS: usize = 5;
-
-/// Draws one row per coordinate: the trace, and the density of the draws after the burn-in.
-pub fn traces(rows: &[Trace], last_step: usize, description: &str) -> Vec<String> {
-    rows.chunks(SHEET_ROWS).map(|rows| sheet(rows, last_step, description)).collect()
+/// Draws one panel per coordinate: the trace, and beside it the density of the draws after the burn-in.
+pub fn traces(rows: &[Trace], last_step: usize, description: &str) -> Vec<Drawing> {
+    rows.iter().map(|row| one(row, last_step, description)).collect()
 }
 
-fn sheet(rows: &[Trace], last_step: usize, description: &str) -> String {
-    let mut svg = Svg::new(WIDTH, rows.len() as f64 * ROW + BOTTOM - 8.0);
-    for (i, row) in rows.iter().enumerate() {
-        let top = i as f64 * ROW + TOP;
-        let width = WIDTH - LEFT - SIDE - GAP - 10.0;
-        let area = Area::new(LEFT, top, width, ROW - TOP - 14.0);
-        draw(&mut svg, row, area, last_step, i + 1 == rows.len());
-    }
-    svg.finish(description)
+fn one(row: &Trace, last_step: usize, description: &str) -> Drawing {
+    let mut svg = Svg::new(PANEL, HEIGHT);
+    let area = Area::new(LEFT, TOP, PANEL - LEFT - SIDE - GAP - 6.0, HEIGHT - TOP - BOTTOM);
+    draw(&mut svg, row, area, last_step);
+    let values = row.chains.iter().enumerate().flat_map(|(i, chain)| {
+        let name = format!("chain {}", row.numbers[i] + 1);
+        let each = row.steps.iter().zip(chain);
+        each.map(move |(&step, &value)| Datum::point(&row.title, &name, (step as f64, value)))
+    });
+    let sorted = sorted(&row.kept);
+    let [low, middle, high] =
+        [0.025, 0.5, 0.975].map(|p| typeset(&significant(quantile(&sorted, p), 3)));
+    let stranded = match row.stranded.iter().filter(|stranded| **stranded).count() {
+        0 => String::new(),
+        n => format!("; stranded chains: {n}"),
+    };
+    let words = format!(
+        "{description}, {}: after {} steps of burn-in the median is {middle}, 95 % of the draws lie from {low} to \
+         {high}{stranded}",
+        row.label, row.burn_in
+    );
+    Drawing::panel(svg.finish(&words), ["step", &row.label], values.collect())
 }
 
 /// Range of the vertical axis: the draws after the burn-in with a wide margin, but no farther than any draw. The
@@ -63,40 +78,38 @@ fn reach(row: &Trace) -> (f64, f64) {
     padded((low.max(all.0), high.min(all.1)), 0.04)
 }
 
-fn draw(svg: &mut Svg, row: &Trace, area: Area, last_step: usize, last_row: bool) {
-    let x = Axis::new("step", (0.0, last_step.max(1) as f64)).ticks(7);
+fn draw(svg: &mut Svg, row: &Trace, area: Area, last_step: usize) {
+    let x = Axis::new("step", (0.0, last_step.max(1) as f64)).ticks(4);
     let y = Axis::new(row.label.as_str(), reach(row)).ticks(5);
     let frame = Frame::new(area, &x, &y);
-    svg.text("panel-title", (area.x, area.y - 8.0), Anchor::Start, &row.title);
-    frame.axes(svg, &x.shown(last_row), &y);
+    svg.text("panel-title", (1.0, 14.0), Anchor::Start, &shortened(&row.title, 46));
+    frame.axes(svg, &x, &y);
     frame.inside(svg, &x, &y, |svg| {
-        for (chain, _) in row.chains.iter().zip(&row.stranded).filter(|(_, stranded)| !**stranded) {
-            svg.path("s-walker", &path(&frame, &row.steps, chain), "");
-        }
-        for (chain, _) in row.chains.iter().zip(&row.stranded).filter(|(_, stranded)| **stranded) {
-            svg.path("s-stranded", &path(&frame, &row.steps, chain), "");
+        for (class, is_stranded) in [("s-walker", false), ("s-stranded", true)] {
+            for (i, chain) in row.chains.iter().enumerate() {
+                if row.stranded[i] == is_stranded {
+                    let name = format!("chain {}", row.numbers[i] + 1);
+                    svg.path(class, &path(&frame, &row.steps, chain), &name);
+                }
+            }
         }
         let start = frame.x.place(row.burn_in as f64);
         svg.rectangle("burn-in", Area::new(area.x, area.y, start - area.x, area.height), "");
         svg.line("burn-in-end", (start, area.y), (start, area.bottom()));
     });
-    if row.burn_in > 0 {
-        let middle = 0.5 * (area.x + frame.x.place(row.burn_in as f64));
-        svg.text("halo", (middle, area.bottom() - 6.0), Anchor::Middle, "burn-in, left out");
-    }
-    draw_density(svg, row, &y, Area::new(area.right() + GAP, area.y, SIDE, area.height), last_row);
+    draw_density(svg, row, &y, Area::new(area.right() + GAP, area.y, SIDE, area.height));
 }
 
 fn path(frame: &Frame, steps: &[usize], chain: &[f64]) -> Path {
     Path::through(steps.iter().zip(chain).map(|(&step, &value)| frame.at((step as f64, value))))
 }
 
-fn draw_density(svg: &mut Svg, row: &Trace, y: &Axis, area: Area, last_row: bool) {
+fn draw_density(svg: &mut Svg, row: &Trace, y: &Axis, area: Area) {
     let curve = smooth_density(&row.kept, row.effective, 256);
     let highest = curve.iter().map(|p| p.1).fold(0.0, f64::max);
     let x = Axis::new("density", (0.0, 1.08 * highest)).ticks(0);
     let frame = Frame::new(area, &x, y);
-    frame.axes(svg, &Axis { numbers: false, ..x.shown(last_row) }, &y.shown(false));
+    frame.axes(svg, &Axis { numbers: false, ..x.clone() }, &y.shown(false));
     let outline: Vec<_> = curve.iter().map(|&(value, d)| frame.at((d, value))).collect();
     let axis: Vec<_> = curve.iter().map(|&(value, _)| frame.at((0.0, value))).collect();
     svg.clipped(area, |svg| {

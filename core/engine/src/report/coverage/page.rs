@@ -6,7 +6,8 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::drawing::ranks_of;
 use super::{edge, intervals, places, said, shapes, verdict};
 use crate::page::chart::Key;
-use crate::page::{Caption, Numbers, STYLE, paragraph};
+use crate::page::drawing::Drawing;
+use crate::page::{Caption, Numbers, SCRIPT, paragraph, style};
 
 /// The counts as one HTML file, the verdict first.
 pub fn coverage_page(found: &Coverage) -> String {
@@ -21,7 +22,7 @@ pub fn coverage_page(found: &Coverage) -> String {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="generator" content=(format!("Lacuna {}", found.version));
                 title { "Coverage: " (found.title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(style())) }
             }
             body {
                 header {
@@ -38,6 +39,7 @@ pub fn coverage_page(found: &Coverage) -> String {
                     section id="ranks" { h2 { "Ranks" } (figure(found, &mut numbers)) }
                 }
                 footer { "Made by Lacuna " (found.version) " from study " code { (found.study) } "." }
+                script { (PreEscaped(SCRIPT)) }
             }
         }
     };
@@ -79,7 +81,7 @@ fn figure(found: &Coverage, numbers: &mut Numbers) -> Markup {
     let cases = found.tally.calibrated;
     let band = ranks::band(cases, &rank_points(cases), 0.99);
     let rows = found.tally.rows.iter().filter(|row| row.of_prior && !row.ranks.is_empty());
-    let drawings: Vec<String> = rows.map(|row| ranks_of(row, &band)).collect();
+    let drawings: Vec<Drawing> = rows.flat_map(|row| ranks_of(row, &band)).collect();
     let caption = Caption::new(
         "The rank of each truth among 99 thinned draws of its posterior, as a share: how many truths fall into each \
          twentieth (left), and the empirical distribution function less that of uniform ranks (right), with the bands \
@@ -95,6 +97,6 @@ fn figure(found: &Coverage, numbers: &mut Numbers) -> Markup {
     if drawings.is_empty() {
         html! {}
     } else {
-        numbers.figure(&drawings, &keys, &caption)
+        numbers.figure("ranks", &drawings, &keys, &caption)
     }
 }

@@ -38,6 +38,7 @@ fn figure(findings: &Findings, ensemble: &EnsembleFindings, numbers: &mut Number
     let is_valid = |i: &usize| ensemble.valid.get(*i).copied().unwrap_or(true);
     let (valid, invalid): (Vec<usize>, Vec<usize>) =
         (0..ensemble.points.rows()).partition(|i| is_valid(i));
+    let outside = invalid.len();
     let mut keys =
         vec![Key::dot("s-run", "run"), Key::area("s-box", "central 99.8 % of the prior")];
     if !invalid.is_empty() {
@@ -46,7 +47,12 @@ fn figure(findings: &Findings, ensemble: &EnsembleFindings, numbers: &mut Number
     let drawing = design_matrix(
         &columns,
         &vec![("s-run", valid), ("s-invalid", invalid)],
-        "scatter plots of the design, one for each pair of parameters",
+        &format!(
+            "scatter plots of the design, one for each pair of parameters: {} runs, {} of them outside the model's range of \
+             validity",
+            count(ensemble.points.rows()),
+            count(outside)
+        ),
     );
     let caption = Caption::new(
         format!(
@@ -58,7 +64,7 @@ fn figure(findings: &Findings, ensemble: &EnsembleFindings, numbers: &mut Number
         "runs inside the prior's box, for only there the surrogate's training bears on the posterior; \
          a box with few runs wants a second design.",
     );
-    numbers.figure(&[drawing], &keys, &caption)
+    numbers.figure("design", &[drawing], &keys, &caption)
 }
 
 fn column(

@@ -2,9 +2,10 @@
 
 use maud::{Markup, html};
 
-use crate::page::chart::{Axis, Band, Curve, Key, Panel, small_multiples};
+use crate::page::chart::{Axis, Band, Curve, Frame, Key, Panel, small_multiples};
 use crate::page::number::{count, fixed};
 use crate::page::scale::{ShownUnit, extent, padded, printed};
+use crate::page::svg::{Area, Path, Svg};
 use crate::page::table::Table;
 use crate::page::{Caption, Numbers, Section};
 use crate::report::findings::{FieldBand, FieldFindings, Findings};
@@ -42,6 +43,12 @@ pub fn field_table(fields: &[FieldFindings]) -> Table {
         ]);
     }
     table
+}
+
+/// A name with letters, digits, `-` and `_` only.
+fn file_name(name: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
+    name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect()
 }
 
 fn figure(found: &FieldFindings, numbers: &mut Numbers) -> Markup {
@@ -90,5 +97,23 @@ fn figure(found: &FieldFindings, numbers: &mut Numbers) -> Markup {
         format!("{whose} of the coefficients; the neglected terms have their prior."),
         "a posterior as wide as the prior: the data say nothing about the field there.",
     );
-    numbers.figure(&small_multiples(&[panel], &x, &y, "random field"), &keys, &caption)
+    let drawings = small_multiples(&[panel], &x, &y, "random field");
+    numbers.figure(&format!("field-{}", file_name(&field.name)), &drawings, &keys, &caption)
+}
+
+/// A small picture of the posterior of a field along its coordinate, without axes; empty without a posterior.
+pub fn sketch(found: &FieldFindings) -> String {
+    let Some(band) = &found.posterior else { return String::new() };
+    let at = &found.field.at;
+    let domain = extent(at.iter().copied()).unwrap_or((0.0, 1.0));
+    let range = extent(band.q025.iter().chain(&band.q975).copied()).unwrap_or((0.0, 1.0));
+    let area = Area::new(0.0, 2.0, 260.0, 56.0);
+    let frame = Frame::new(area, &Axis::new("", domain), &Axis::new("", range));
+    let along = |values: &[f64]| -> Vec<(f64, f64)> {
+        at.iter().zip(values).map(|(&x, &y)| frame.at((x, y))).collect()
+    };
+    let mut svg = Svg::new(260.0, 60.0);
+    svg.path("s-band", &Path::band(&along(&band.q975), &along(&band.q025)), "");
+    svg.path("line s-mean", &Path::through(along(&band.mean)), "");
+    svg.finish(&format!("posterior mean and 95 % band of the field {}", found.field.name))
 }

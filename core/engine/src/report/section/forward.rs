@@ -6,6 +6,7 @@ use maud::{Markup, html};
 use super::{response_label, response_unit};
 use crate::page::chart::{Axis, Band, BarChart, BarSeries, Curve, Key, Panel, small_multiples};
 use crate::page::curves::{CurvePanel, Curves};
+use crate::page::drawing::Drawing;
 use crate::page::number::fixed;
 use crate::page::scale::{extent, padded};
 use crate::page::table::Table;
@@ -78,11 +79,12 @@ fn response(findings: &Findings, found: &Propagated, numbers: &mut Numbers) -> M
         format!("{}, with the errors of emulator and numerics.", given(found)),
         "a mean outside the band, or far from the median: the distribution is skewed there.",
     );
-    numbers.figure(&small_multiples(&panels, &x, &y, "response under the priors"), &keys, &caption)
+    let drawings = small_multiples(&panels, &x, &y, "response under the priors");
+    numbers.figure("prior-response", &drawings, &keys, &caption)
 }
 
 /// Classes of the lines of inputs, in the order of their importance; further inputs are in the file alone.
-const LINES: [&str; 6] = ["i-first", "i-second", "i-third", "i-fourth", "i-fifth", "i-sixth"];
+pub const LINES: [&str; 6] = ["i-first", "i-second", "i-third", "i-fourth", "i-fifth", "i-sixth"];
 
 /// Indices of the inputs that are drawn: those with the largest total index, averaged over the outputs that vary.
 fn drawn(found: &Propagated) -> Vec<usize> {
@@ -148,7 +150,7 @@ fn indices_of_response(findings: &Findings, found: &Propagated, numbers: &mut Nu
         "a total index far above the first order: the input acts through others. A gap: nothing varies there.",
     );
     let drawing = small_multiples(&both, &x, &y, "Sobol indices of the response");
-    numbers.figure(&drawing, &keys, &caption)
+    numbers.figure("response-sobol", &drawing, &keys, &caption)
 }
 
 /// Table of the shares of every input in the variance of every quantity.
@@ -207,7 +209,7 @@ fn bars(all: &[QuantityFindings], found: &Propagated, numbers: &mut Numbers) -> 
         };
         chart.draw(&format!("shares of the inputs in the variance of {}", quantity.name))
     };
-    let shown: Vec<String> = all.iter().take(MOST).map(chart).collect();
+    let shown: Vec<Drawing> = all.iter().take(MOST).map(chart).collect();
     let keys = [
         Key::area("s-first", "first order: the input alone"),
         Key::area("s-shapley", "Shapley: interactions divided equally"),
@@ -221,7 +223,7 @@ fn bars(all: &[QuantityFindings], found: &Propagated, numbers: &mut Numbers) -> 
         format!("{}, without errors of emulator and numerics.", given(found)),
         "inputs whose measurement or tighter manufacture would help the prediction most.",
     );
-    numbers.figure(&shown, &keys, &caption)
+    numbers.figure("quantity-shares", &shown, &keys, &caption)
 }
 
 /// Largest number of quantities whose bars are drawn.

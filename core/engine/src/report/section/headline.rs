@@ -1,12 +1,14 @@
 //! The main results, warnings first.
 
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
 
+use super::fields::sketch;
 use super::{banner, coordinate_unit, intervals, response_unit};
 use crate::gap::report::verdict;
-use crate::page::number::{decimals, fixed, percent, typeset};
+use crate::page::number::{decimals, fixed, percent, significant, typeset};
 use crate::page::paragraph;
-use crate::report::findings::{CalibrationFindings, Findings};
+use crate::page::scale::{ShownUnit, extent};
+use crate::report::findings::{CalibrationFindings, CoordinateFindings, FieldFindings, Findings};
 use crate::report::qualified;
 use crate::stage::validate::ValidationFindings;
 
@@ -54,9 +56,10 @@ pub fn sentences(findings: &Findings) -> Vec<String> {
 }
 
 fn estimate(findings: &Findings, calibration: &CalibrationFindings) -> String {
-    let (shown, further) = chosen(findings);
-    let parameters = calibration.coordinates.iter().take(shown);
-    let values: Vec<String> = parameters
+    let (shown, further) = chosen(findings, calibration);
+    let fields = findings.fields.iter().filter_map(field_in_words);
+    let values: Vec<String> = shown
+        .into_iter()
         .map(|c| {
             let unit = coordinate_unit(c);
             let places = decimals(unit.show(c.mcse_mean), unit.show(c.sd));
@@ -64,6 +67,7 @@ fn estimate(findings: &Findings, calibration: &CalibrationFindings) -> String {
             let interval = format!("{} to {}", number(c.q025), number(c.q975));
             format!("`{}` {}", c.name, unit.join(&format!("{} ({interval})", number(c.mean))))
         })
+        .chain(fields)
         .collect();
     let further = match further {
         0 => String::new(),
@@ -75,12 +79,54 @@ fn estimate(findings: &Findings, calibration: &CalibrationFindings) -> String {
 /// Largest number of parameters that are all shown at the top of the page, and the number shown if there are more.
 const MOST_TOLD: (usize, usize) = (12, 6);
 
-/// Numbers of parameters that are shown at the top of the page and that are left to the table.
-fn chosen(findings: &Findings) -> (usize, usize) {
+/// Parameters that are shown at the top of the page, and the number of those that are left to the table. The
+/// coefficients of random fields are left out: they mean nothing by themselves, and their fields stand there instead.
+fn chosen<'a>(
+    findings: &Findings,
+    calibration: &'a CalibrationFindings,
+) -> (Vec<&'a CoordinateFindings>, usize) {
+    let coefficients: Vec<String> =
+        findings.fields.iter().flat_map(|found| found.field.coefficients()).collect();
+    let parameters = calibration.coordinates.iter().take(findings.parameters.len());
+    let mut shown: Vec<_> = parameters.filter(|c| !coefficients.contains(&c.name)).collect();
     let (most, told) = MOST_TOLD;
-    let all = findings.parameters.len();
-    let shown = if all > most { told } else { all };
-    (shown, all - shown)
+    let all = shown.len();
+    if all > most {
+        shown.truncate(told);
+    }
+    let further = all - shown.len();
+    (shown, further)
+}
+
+/// Displayed unit of a field, and the formatted ends of the range of its posterior mean and of its 95 % band.
+fn field_range(found: &FieldFindings) -> Option<(ShownUnit, [[String; 2]; 2])> {
+    let band = found.posterior.as_ref()?;
+    let edges = band.q025.iter().chain(&band.q975).copied();
+    let unit = ShownUnit::for_values(&found.field.unit, edges.clone());
+    let (mean, edges) = (extent(band.mean.iter().copied())?, extent(edges)?);
+    let text = |value: f64| typeset(&significant(unit.show(value), 3));
+    let both = [mean, edges].map(|(low, high)| [text(low), text(high)]);
+    Some((unit, both))
+}
+
+/// A field in the sentence on the posterior.
+fn field_in_words(found: &FieldFindings) -> Option<String> {
+    let (unit, [[low, high], [least, most]]) = field_range(found)?;
+    let values = unit.join(&format!("{low} to {high} ({least} to {most})"));
+    Some(format!("the field `{}` along `{}` {values}", found.field.name, found.field.axis))
+}
+
+/// The tile of a field: its posterior mean with its 95 % band along its coordinate.
+fn field_card(found: &FieldFindings) -> Markup {
+    let Some((unit, [[low, high], [least, most]])) = field_range(found) else { return html! {} };
+    html! {
+        div.card {
+            div.card-name { "field " (found.field.name) }
+            div.card-value { (low) " to " (high) " " span.card-unit { (unit.join("")) } }
+            div.card-more { "posterior mean along " (found.field.axis) " · 95 % between " (least) " and " (most) }
+            (PreEscaped(sketch(found)))
+        }
+    }
 }
 
 fn convergence(findings: &Findings, calibration: &CalibrationFindings) -> String {
@@ -125,10 +171,10 @@ pub fn case_title(name: &str) -> &str {
 }
 
 fn cards(findings: &Findings, calibration: &CalibrationFindings) -> Markup {
-    let parameters = calibration.coordinates.iter().take(chosen(findings).0);
     html! {
         div.cards {
-            @for c in parameters {
+            @for found in &findings.fields { (field_card(found)) }
+            @for c in chosen(findings, calibration).0 {
                 @let unit = coordinate_unit(c);
                 @let places = decimals(unit.show(c.mcse_mean), unit.show(c.sd));
                 div.card {

@@ -6,6 +6,7 @@ use maud::{Markup, html};
 use super::first_of_quantities;
 use super::quantities::unit;
 use crate::page::chart::{Axis, Band, Curve, Key, Panel, small_multiples};
+use crate::page::drawing::Drawing;
 use crate::page::number::{count, significant};
 use crate::page::scale::{ShownUnit, extent, padded};
 use crate::page::table::Table;
@@ -107,7 +108,7 @@ const MOST: usize = 8;
 fn boxes(all: &[QuantityFindings], numbers: &mut Numbers) -> Markup {
     let bounded: Vec<(&QuantityFindings, &Bounds)> =
         all.iter().filter_map(|found| Some((found, found.bounds.as_ref()?))).collect();
-    let drawings: Vec<String> =
+    let drawings: Vec<Drawing> =
         bounded.iter().take(MOST).flat_map(|(found, bounds)| drawing(found, bounds)).collect();
     if drawings.is_empty() {
         return html! {};
@@ -127,10 +128,10 @@ fn boxes(all: &[QuantityFindings], numbers: &mut Numbers) -> Markup {
         "the priors, at every value that the intervals allow: each gives a curve inside the box.",
         "a box that is much wider than the dashed curve is steep: what is unknown in the intervals outweighs what varies.",
     );
-    numbers.figure(&drawings, &keys, &caption)
+    numbers.figure("probability-boxes", &drawings, &keys, &caption)
 }
 
-fn drawing(found: &QuantityFindings, bounds: &Bounds) -> Vec<String> {
+fn drawing(found: &QuantityFindings, bounds: &Bounds) -> Vec<Drawing> {
     let own = unit(found);
     let range =
         padded(extent(bounds.quantiles.iter().flatten().copied()).unwrap_or((0.0, 1.0)), 0.06);

@@ -76,7 +76,7 @@ fn figure(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Number
         },
         "curves apart from the others, bands that widen late, gaps.",
     );
-    numbers.figure(&drawing, &keys, &caption)
+    numbers.figure("measurements", &drawing, &keys, &caption)
 }
 
 fn panel(
@@ -95,7 +95,7 @@ fn panel(
     let mut curves: Vec<Curve> = chosen
         .map(|(_, (replicate, begin))| Curve {
             class: if is_flagged(&replicate.name) { "s-flagged" } else { "s-replicate" },
-            name: String::new(),
+            name: replicate.name.clone(),
             points: outline
                 .curve(|i| replicate.values[i - begin].map_or(f64::NAN, |v| unit.show(v))),
         })

@@ -1,6 +1,7 @@
 //! The sections of the report, one per file; a section is left out if the run has no results for it.
 
 pub mod banner;
+mod drawn;
 mod ensemble;
 pub mod evidence;
 mod fields;
@@ -8,11 +9,13 @@ mod forward;
 pub mod headline;
 mod intervals;
 mod measurements;
+mod mixing;
 mod overview;
 mod populations;
 mod posterior;
 mod quantities;
 mod reliability;
+mod residuals;
 mod sampling;
 pub mod screening;
 mod surrogate;
@@ -48,7 +51,7 @@ pub fn all(findings: &Findings, numbers: &mut Numbers) -> Vec<Section> {
         posterior::section(findings, numbers),
         populations::section(findings.calibration.as_ref(), numbers),
         fields::section(findings, numbers),
-        evidence::section(findings),
+        evidence::section(findings, numbers),
         validation::section(findings, numbers),
         quantities::section(findings, numbers),
         intervals::section(findings, numbers),

@@ -5,11 +5,11 @@ use maud::{Markup, html};
 use super::sampling::{kept_draws, marks};
 use super::{coordinate_unit, first_of, response_unit, titled};
 use crate::page::chart::{
-    Curve, Key, MOST_PAIRED, Marginal, Mark, PairColumn, SecondAxis, correlation_map, marginals,
-    pair_matrix,
+    Curve, Key, MOST_PAIRED, Marginal, Mark, PairColumn, Row, SecondAxis, correlation_map,
+    marginals, pair_matrix, row_chart,
 };
 use crate::page::curve::named_density;
-use crate::page::number::{decimals, fixed, rounded, significant};
+use crate::page::number::{decimals, fixed, percent, rounded, significant, typeset};
 use crate::page::scale::{extent, printed};
 use crate::page::table::Table;
 use crate::page::{Caption, Numbers, Section};
@@ -24,6 +24,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         @if several { (correlation(calibration, numbers)) }
         @if !calibration.draws.is_empty() {
             (parameter_marginals(findings, calibration, numbers))
+            (narrowing(calibration, numbers))
             (hyperparameter_marginals(findings, calibration, numbers))
             (derived_marginals(findings, calibration, numbers))
             @if several { (pairs(calibration, numbers)) }
@@ -71,7 +72,7 @@ fn correlation(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Mark
         "the posterior.",
         "numbers near ±1: the data fix a combination of the two and not each of them.",
     );
-    numbers.figure(&[drawing], &[], &caption)
+    numbers.figure("correlation", &[drawing], &[], &caption)
 }
 
 /// Largest number of coordinates of one role that are shown in histograms.
@@ -99,7 +100,8 @@ fn parameter_marginals(
         "a histogram cut off at the prior's bound; a posterior as wide as the prior, which means that \
          the data said nothing; a reference in the tail.",
     );
-    numbers.figure(&marginals(&panels, "marginals of the parameters"), &keys, &caption)
+    let drawings = marginals(&panels, "marginal of a parameter");
+    numbers.figure("marginals", &drawings, &keys, &caption)
 }
 
 fn hyperparameter_marginals(
@@ -129,11 +131,8 @@ fn hyperparameter_marginals(
          deviation is that of single data around the model, not an uncertainty of the parameters.",
         "a standard deviation far above the spread of the replicates: the model misses something.",
     );
-    numbers.figure(
-        &marginals(&panels, "marginals of the hyperparameters"),
-        &marginal_keys(),
-        &caption,
-    )
+    let drawings = marginals(&panels, "marginal of a hyperparameter");
+    numbers.figure("hyperparameter-marginals", &drawings, &marginal_keys(), &caption)
 }
 
 /// Number of coordinates with this role.
@@ -164,11 +163,41 @@ fn derived_marginals(
         "quantities that are far better known than the parameters of which they are made.",
     );
     let [draws, fit, _, map] = marginal_keys();
-    numbers.figure(
-        &marginals(&panels, "marginals of the derived quantities"),
-        &[draws, fit, map],
-        &caption,
-    )
+    let drawings = marginals(&panels, "marginal of a derived quantity");
+    numbers.figure("derived-marginals", &drawings, &[draws, fit, map], &caption)
+}
+
+/// Width of the posterior against that of the prior.
+fn narrowing(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
+    let ratio = |c: &CoordinateFindings| {
+        let prior = c.prior.as_ref()?;
+        let width = prior.quantile(0.975) - prior.quantile(0.025);
+        let ratio = (c.q975 - c.q025) / width;
+        (ratio.is_finite() && width > 0.0).then_some(ratio)
+    };
+    let row = |c: &CoordinateFindings| {
+        let (unit, share) = (coordinate_unit(c), ratio(c)?);
+        let number = |v: f64| typeset(&significant(unit.show(v), 3));
+        let interval = unit.join(&format!("{} to {}", number(c.q025), number(c.q975)));
+        let text = format!("{} · {interval}", percent(share));
+        Some(Row { name: titled(&c.name, &c.symbol), value: share, text })
+    };
+    let rows: Vec<Row> =
+        calibration.coordinates.iter().filter_map(row).take(2 * MOST_SHOWN).collect();
+    if rows.is_empty() {
+        return html! {};
+    }
+    let all = calibration.coordinates.iter().filter(|c| ratio(c).is_some()).count();
+    let caption = Caption::new(
+        format!(
+            "Prior against posterior: the width of the posterior's central 95 % as a share of that of the prior, with its ends.{}",
+            first_of(all, 2 * MOST_SHOWN)
+        ),
+        "posterior over prior, each unknown by itself.",
+        "shares near 100 %: the data say nothing about that unknown by itself. Above: data and prior contradict each other.",
+    );
+    let drawing = row_chart(&rows, "bar s-part", "posterior width as a share of the prior's");
+    numbers.figure("prior-and-posterior", &[drawing], &[], &caption)
 }
 
 fn marginal_keys() -> [Key; 4] {
@@ -268,7 +297,24 @@ fn pairs(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
         "the posterior.",
         "narrow ridges, bananas, several islands.",
     );
-    numbers.figure(&[pair_matrix(&columns, "the posterior in pairs")], &keys, &caption)
+    numbers.figure("pairs", &[pair_matrix(&columns, &in_pairs(calibration))], &keys, &caption)
+}
+
+/// Description of the pairs: the strongest correlation among the coordinates that are drawn.
+fn in_pairs(calibration: &CalibrationFindings) -> String {
+    let n = calibration.coordinates.len().min(MOST_PAIRED);
+    let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let size = |&(i, j): &(usize, usize)| calibration.correlation[(i, j)].abs();
+    let known = pairs.filter(|pair| size(pair).is_finite());
+    match known.max_by(|a, b| size(a).total_cmp(&size(b))) {
+        Some((i, j)) => format!(
+            "the posterior in pairs; the strongest correlation is {}, of {} and {}",
+            typeset(&fixed(calibration.correlation[(i, j)], 2)),
+            calibration.coordinates[j].name,
+            calibration.coordinates[i].name
+        ),
+        None => "the posterior in pairs; no correlation is known".to_owned(),
+    }
 }
 
 /// The MAP and the reference; every column has both, so that they form pairs.

@@ -184,7 +184,8 @@ fn histograms(all: &[QuantityFindings], numbers: &mut Numbers) -> Markup {
         Key::line("m-map", "median"),
         Key::line("m-interval", "95 % interval"),
     ];
-    numbers.figure(&marginals(&panels, "draws of the quantities"), &keys, &caption)
+    let drawings = marginals(&panels, "draws of a quantity");
+    numbers.figure("quantities", &drawings, &keys, &caption)
 }
 
 fn sources(table: &Table, numbers: &mut Numbers) -> Markup {

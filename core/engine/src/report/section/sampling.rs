@@ -3,7 +3,7 @@
 use lacuna::plugin::Fact;
 use maud::{Markup, html};
 
-use super::{coordinate_unit, fact_list, first_of, titled};
+use super::{coordinate_unit, fact_list, first_of, mixing, titled};
 use crate::page::chart::{Axis, BarChart, BarSeries, Key, Level, Mark, Trace, traces};
 use crate::page::number::{count, percent, significant};
 use crate::page::scale::ShownUnit;
@@ -11,10 +11,10 @@ use crate::page::{Caption, Numbers, Section, paragraph};
 use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings};
 
 /// Approximate total number of points of all traces.
-const MOST_POINTS: usize = 70_000;
+const MOST_POINTS: usize = 32_000;
 
 /// Approximate number of chains that are drawn.
-const MOST_CHAINS: usize = 200;
+const MOST_CHAINS: usize = 100;
 
 /// Largest number of coordinates with a trace.
 const MOST_ROWS: usize = 16;
@@ -37,6 +37,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         (fact_list(&facts(calibration)))
         @if !calibration.acceptance.is_empty() { (acceptance(calibration, numbers)) }
         @if !calibration.draws.is_empty() { (walkers(calibration, numbers)) }
+        (mixing::figures(calibration, numbers))
     };
     Some(Section { id: "sampling", title: "Sampling", content })
 }
@@ -85,7 +86,12 @@ fn acceptance(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Marku
         "none: each bar is one chain.",
         "chains that hardly move. For ensembles of walkers 0.2 to 0.5 is usual.",
     );
-    numbers.figure(&[chart.draw("share of accepted moves of every chain")], &keys, &caption)
+    numbers.figure(
+        "acceptance",
+        &[chart.draw("share of accepted moves of every chain")],
+        &keys,
+        &caption,
+    )
 }
 
 fn walkers(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
@@ -122,7 +128,7 @@ fn walkers(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
         "the posterior, after the burn-in.",
         "after the burn-in a band of constant middle and width, without drift and without lonely lines.",
     );
-    numbers.figure(&drawing, &keys, &caption)
+    numbers.figure("traces", &drawing, &keys, &caption)
 }
 
 /// Evenly spaced chains, and all stranded ones.
@@ -142,6 +148,7 @@ fn trace(calibration: &CalibrationFindings, i: usize, chains: &[usize], steps: &
         title: titled(&coordinate.name, &coordinate.symbol),
         label: unit.label(&coordinate.name),
         chains: chains.iter().map(|&c| chain(c)).collect(),
+        numbers: chains.to_vec(),
         stranded: chains.iter().map(|c| calibration.stranded.contains(c)).collect(),
         steps: steps.to_vec(),
         burn_in: calibration.burn_in,

@@ -1,10 +1,16 @@
 //! The surrogate and its errors.
 
+use lacuna_linalg::Matrix;
 use maud::{Markup, html};
 
+use super::forward::LINES;
 use super::{fact_list, group_word, response_label, response_unit};
-use crate::page::chart::{Axis, BarChart, BarSeries, Key, agreement};
+use crate::page::chart::{
+    Axis, BarChart, BarSeries, Curve, Key, Panel, agreement, small_multiples,
+};
+use crate::page::curves::{CurvePanel, Curves};
 use crate::page::number::{count, significant};
+use crate::page::scale::extent;
 use crate::page::table::Table;
 use crate::page::{Caption, Numbers, Section};
 use crate::report::findings::{Findings, SurrogateFindings};
@@ -33,7 +39,9 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         (fact_list(&surrogate.facts))
         (errors(findings, surrogate, numbers))
         @if !surrogate.pairs.is_empty() { (pairs(findings, surrogate, numbers)) }
+        (errors_along(findings, surrogate, numbers))
         @if let Some(sobol) = &surrogate.sobol { (sensitivity(findings, sobol, numbers)) }
+        @if let Some(total) = &surrogate.total_by_output { (sensitivity_along(findings, total, numbers)) }
     };
     Some(Section { id: "surrogate", title: "Surrogate", content })
 }
@@ -78,7 +86,7 @@ fn pairs(findings: &Findings, surrogate: &SurrogateFindings, numbers: &mut Numbe
         "none is drawn: each dot is one output of one run.",
         "dots off the line, above all a bend at the ends.",
     );
-    numbers.figure(&[drawing], &keys, &caption)
+    numbers.figure("surrogate", &[drawing], &keys, &caption)
 }
 
 fn sensitivity(findings: &Findings, sobol: &[(f64, f64)], numbers: &mut Numbers) -> Markup {
@@ -114,5 +122,89 @@ fn sensitivity(findings: &Findings, sobol: &[(f64, f64)], numbers: &mut Numbers)
         "a small total index: the data can say little about that parameter. A total far above the \
          first order: it acts through the others.",
     );
-    numbers.figure(&[chart.draw("Sobol indices of every parameter")], &keys, &caption)
+    numbers.figure(
+        "sobol-indices",
+        &[chart.draw("Sobol indices of every parameter")],
+        &keys,
+        &caption,
+    )
+}
+
+/// The leave-one-out error along the curves.
+fn errors_along(
+    findings: &Findings,
+    surrogate: &SurrogateFindings,
+    numbers: &mut Numbers,
+) -> Markup {
+    let errors = &surrogate.loo_by_output;
+    let outlines = Curves::of(&findings.layouts);
+    let Some((_, highest)) = extent(errors.iter().copied()) else { return html! {} };
+    let value = |i: usize| errors.get(i).copied().unwrap_or(f64::NAN);
+    let panel = |outline: &CurvePanel| Panel {
+        title: outline.title.clone(),
+        remark: String::new(),
+        bands: Vec::new(),
+        curves: vec![Curve {
+            class: "s-map",
+            name: "leave-one-out error".to_owned(),
+            points: outline.curve(value),
+        }],
+    };
+    let panels: Vec<Panel> = outlines.panels.iter().map(panel).collect();
+    let x = Axis::new(outlines.label.as_str(), outlines.domain).ticks(6);
+    let y = Axis::new("error [share]", (0.0, 1.06 * highest)).ticks(5);
+    let keys = [Key::line("s-map", "leave-one-out error")];
+    let caption = Caption::new(
+        format!(
+            "The surrogate's leave-one-out error at each place, relative to the variance of the output over the runs.{}",
+            outlines.left_out_sentence()
+        ),
+        "sampling error over the design.",
+        "places where the surrogate explains little: the data there say less than they could.",
+    );
+    let drawings = small_multiples(&panels, &x, &y, "error of the surrogate");
+    numbers.figure("surrogate-error", &drawings, &keys, &caption)
+}
+
+/// The total Sobol indices along the curves, those of the parameters with the largest.
+fn sensitivity_along(findings: &Findings, total: &Matrix, numbers: &mut Numbers) -> Markup {
+    let outlines = Curves::of(&findings.layouts);
+    let weight = |i: usize| -> f64 { total.column(i).into_iter().filter(|s| s.is_finite()).sum() };
+    let mut order: Vec<usize> = (0..total.columns()).collect();
+    order.sort_by(|&a, &b| weight(b).total_cmp(&weight(a)).then(a.cmp(&b)));
+    order.truncate(LINES.len());
+    let name =
+        |input: usize| findings.parameters.get(input).map_or("", |p| p.name.as_str()).to_owned();
+    let panel = |outline: &CurvePanel| {
+        let line = |(&input, class): (&usize, &'static str)| Curve {
+            class,
+            name: name(input),
+            points: outline.curve(|j| if j < total.rows() { total[(j, input)] } else { f64::NAN }),
+        };
+        Panel {
+            title: outline.title.clone(),
+            remark: String::new(),
+            bands: Vec::new(),
+            curves: order.iter().zip(LINES).map(line).collect(),
+        }
+    };
+    let panels: Vec<Panel> = outlines.panels.iter().map(panel).collect();
+    let x = Axis::new(outlines.label.as_str(), outlines.domain).ticks(6);
+    let y = Axis::new("total Sobol index", (-0.05, 1.1)).ticks(4);
+    let keys: Vec<Key> =
+        order.iter().zip(LINES).map(|(&input, class)| Key::line(class, name(input))).collect();
+    let further = match total.columns() - order.len() {
+        0 => String::new(),
+        n => format!(" {n} parameters with smaller indices are not drawn."),
+    };
+    let caption = Caption::new(
+        format!(
+            "Total Sobol indices at each place: the share of the response's variance there in which a parameter takes part.{further}{}",
+            outlines.left_out_sentence()
+        ),
+        "variance over the design, not over the posterior.",
+        "the sensors and times from which a parameter is learned.",
+    );
+    let drawings = small_multiples(&panels, &x, &y, "Sobol indices");
+    numbers.figure("sobol-along-curves", &drawings, &keys, &caption)
 }

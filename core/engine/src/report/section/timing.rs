@@ -36,7 +36,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
     Some(Section {
         id: "timing",
         title: "Time",
-        content: numbers.figure(&[drawing], &[], &caption),
+        content: numbers.figure("time", &[drawing], &[], &caption),
     })
 }
 

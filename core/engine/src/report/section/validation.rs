@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::headline::case_title;
-use super::{coordinate_unit, group_word, response_label, response_unit};
+use super::{coordinate_unit, drawn, group_word, residuals, response_label, response_unit};
 use crate::page::chart::{
     Axis, Band, BarChart, BarSeries, Curve, Key, Panel, Row, row_chart, small_multiples,
 };
@@ -22,6 +22,8 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         @if !validation.cases.is_empty() {
             (points(findings, validation, numbers))
             (curves(findings, validation, numbers))
+            (residuals::map(findings, validation, numbers))
+            (drawn::figure(findings, validation, numbers))
             @if validation.cases.iter().any(|case| !case.accuracy.is_empty()) {
                 (accuracy(findings, validation, numbers))
             }
@@ -133,7 +135,7 @@ fn curves(findings: &Findings, validation: &ValidationFindings, numbers: &mut Nu
          that no choice of these parameters removes.",
     );
     let drawing = small_multiples(&panels, &x, &y, "calibrated simulation against measurements");
-    numbers.figure(&drawing, &keys, &caption)
+    numbers.figure("validation", &drawing, &keys, &caption)
 }
 
 fn panel(validation: &ValidationFindings, outline: &CurvePanel, unit: &ShownUnit) -> Panel {
@@ -232,7 +234,7 @@ fn accuracy(findings: &Findings, validation: &ValidationFindings, numbers: &mut 
     let table_caption =
         Caption::new("The same accuracies as numbers, with their mean over the groups.", "", "");
     html! {
-        (numbers.figure(&[chart.draw("accuracy of every group")], &keys, &caption))
+        (numbers.figure("accuracy", &[chart.draw("accuracy of every group")], &keys, &caption))
         (numbers.table(&accuracy_table(group_word(&findings.layouts), cases), &table_caption))
     }
 }
@@ -266,5 +268,5 @@ fn spread(findings: &Findings, validation: &ValidationFindings, numbers: &mut Nu
          more runs would help.",
     );
     let drawing = row_chart(&rows, "bar s-part", "variance of a new replicate by origin");
-    numbers.figure(&[drawing], &[], &caption)
+    numbers.figure("spread", &[drawing], &[], &caption)
 }

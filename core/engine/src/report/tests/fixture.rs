@@ -11,15 +11,14 @@ use crate::report::findings::{
     SurrogateFindings,
 };
 use crate::stage::screen::FlaggedCurve;
-use crate::stage::validate::{ValidationCase, ValidationFindings};
 
-const SENSORS: [&str; 10] = ["B", "C", "G", "M", "R", "T", "U", "V", "Y", "Z"];
-const TIMES: usize = 100;
+pub const SENSORS: [&str; 10] = ["B", "C", "G", "M", "R", "T", "U", "V", "Y", "Z"];
+pub const TIMES: usize = 100;
 const REPLICATES: usize = 16;
 pub(super) const RUNS: usize = 603;
 const NAMES: [&str; 4] = ["tensile_cutoff", "density", "sound_speed", "variance"];
-const MEAN: [f64; 4] = [6.49e4, 12_111.8, 1849.7, 1.02e-9];
-const SD: [f64; 4] = [2.39e3, 14.9, 5.3, 1.15e-11];
+pub const MEAN: [f64; 4] = [6.49e4, 12_111.8, 1849.7, 1.02e-9];
+pub const SD: [f64; 4] = [2.39e3, 14.9, 5.3, 1.15e-11];
 
 /// Results of all stages.
 pub fn findings() -> Findings {
@@ -48,7 +47,8 @@ pub fn findings() -> Findings {
         measured: Some(measured(&layout)),
         surrogate: Some(surrogate(&layout)),
         calibration: Some(calibration()),
-        validation: Some(validation(&layout)),
+        drawn: Some(super::drawn::drawn(&layout)),
+        validation: Some(super::drawn::validation(&layout)),
         layouts: layout.into(),
         quantities: Vec::new(),
         propagated: None,
@@ -87,6 +87,7 @@ pub fn bare() -> Findings {
         measured: None,
         surrogate: None,
         calibration: None,
+        drawn: None,
         validation: None,
         made_by: Vec::new(),
         seconds: Vec::new(),
@@ -126,7 +127,7 @@ pub(super) fn parameters() -> Vec<Parameter> {
 }
 
 /// Strain at a wall: a rise, then two damped modes.
-fn strain(sensor: usize, t: f64, shift: f64) -> f64 {
+pub fn strain(sensor: usize, t: f64, shift: f64) -> f64 {
     let s = sensor as f64;
     let arrival = 5e-5 + 4e-5 * (s * 1.7).sin().abs() * (s + 1.0) * 0.4;
     let tau = (t - arrival).max(0.0) * (1.0 + shift);
@@ -137,13 +138,13 @@ fn strain(sensor: usize, t: f64, shift: f64) -> f64 {
     size * rise * (0.75 * slow * (-tau / 6e-4).exp() + 0.3 * fast * (-tau / 3e-4).exp() + 0.25)
 }
 
-fn response(layout: &Layout, shift: f64, gain: f64) -> Vec<f64> {
+pub fn response(layout: &Layout, shift: f64, gain: f64) -> Vec<f64> {
     (0..layout.len())
         .map(|i| gain * strain(i / TIMES, (i % TIMES + 1) as f64 * 1e-5, shift))
         .collect()
 }
 
-fn measured(layout: &Layout) -> MeasuredFindings {
+pub fn measured(layout: &Layout) -> MeasuredFindings {
     let replicates = (0..REPLICATES).map(|r| {
         let mut rng = Stream::root(2).named("replicate").at(r as u64).generator();
         let gain = 1.0 + 0.05 * normal(&mut rng);
@@ -203,6 +204,10 @@ fn surrogate(layout: &Layout) -> SurrogateFindings {
             .collect(),
         near_posterior: Some((1.1e-5, 41)),
         pairs: pairs.collect(),
+        loo_by_output: truth.iter().map(|y| 1e-3 + y.abs()).collect(),
+        total_by_output: Some(Matrix::from_fn(truth.len(), 3, |i, j| {
+            [0.1, 0.4, 0.6][j] + 1e-4 * i as f64
+        })),
         sobol: Some(vec![(0.06, 0.11), (0.34, 0.43), (0.49, 0.61)]),
     }
 }
@@ -250,6 +255,7 @@ fn calibration() -> CalibrationFindings {
             unreliable: 0,
             limit: 0.67,
             count: 500,
+            k_hat: (0..500).map(|i| 0.4 * (f64::from(i) * 0.7).sin() + 0.2).collect(),
             curves: Some(crate::report::findings::CurvesLeftOutFindings {
                 elpd: -1190.0,
                 error: 33.0,
@@ -272,6 +278,7 @@ fn calibration() -> CalibrationFindings {
                   autocorrelation times long (wanted: 50); about 900 more steps would do"
             .into(),
         log_density: (98_211.42, 98_210.07),
+        mixing: super::drawn::mixing(),
         facts: vec![
             Fact::new("stretch", 2),
             Fact::new("log density evaluations", "144000 of the emulator, none of the simulator"),
@@ -336,37 +343,4 @@ fn correlation() -> Matrix {
         [-0.01, 0.02, 0.00, 1.0],
     ];
     Matrix::from_rows(4, entries)
-}
-
-fn validation(layout: &Layout) -> ValidationFindings {
-    let replicates = measured(layout).used.summaries();
-    let case = |name: &str, point: &[f64], shift, gain, base: f64, rmse| {
-        let accuracy = SENSORS.iter().enumerate().map(|(i, s)| {
-            ((*s).to_owned(), (base + 0.18 * (i as f64 * 1.3).sin()).clamp(0.0, 1.0))
-        });
-        ValidationCase {
-            name: name.into(),
-            point: point.to_vec(),
-            response: response(layout, shift, gain),
-            simulated: true,
-            accuracy: accuracy.collect(),
-            average: base,
-            rmse,
-        }
-    };
-    let center = response(layout, 0.004, 1.0);
-    ValidationFindings {
-        cases: vec![
-            case("map", &MEAN[..3], 0.02, 0.97, 0.78, 1.9e-5),
-            case("reference", &[1.5e5, 13_500.0, 1456.0], 0.13, 1.16, 0.52, 4.6e-5),
-        ],
-        replicates: replicates.iter().map(|s| (s.count, s.mean, s.sd().unwrap_or(0.0))).collect(),
-        predictive: Some((
-            center.iter().map(|c| c - 6.3e-5).collect(),
-            center.iter().map(|c| c + 6.3e-5).collect(),
-        )),
-        spread: [("discrepancy", 2.9e-5), ("emulator", 1.1e-5), ("measurement", 1.4e-5)]
-            .map(|(origin, sd)| (origin.to_owned(), sd))
-            .to_vec(),
-    }
 }

@@ -10,6 +10,9 @@ pub struct ValidationFindings {
     /// Number, mean and standard deviation of the replicates for each value of the layout, the last two in the
     /// response's unit.
     pub replicates: Vec<(usize, f64, f64)>,
+    /// Difference between the replicates' mean and the response of the first case, in standard deviations of a new
+    /// replicate (its 95 % band over twice 1.96), one value per output; NaN where nothing was measured.
+    pub residuals: Vec<f64>,
     /// Posterior predictive 95 % band of a new replicate, lower and upper bound, one value per output.
     pub predictive: Option<(Vec<f64>, Vec<f64>)>,
     /// Standard deviation of a new replicate by origin, root mean square over outputs, in the response's unit.
