@@ -7,6 +7,7 @@ mod assess;
 mod bad_input;
 mod browser;
 mod campaign;
+mod celsius;
 mod commands;
 mod coverage;
 mod cut;

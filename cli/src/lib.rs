@@ -4,6 +4,7 @@ mod campaign;
 mod coverage;
 mod gap;
 mod inspect;
+mod manual;
 mod new;
 mod plugins;
 mod progress;
@@ -198,6 +199,13 @@ enum Verb {
         #[command(subcommand)]
         what: new::What,
     },
+    /// Print the completions of a shell: `lacuna completions bash > ~/.local/share/bash-completion/completions/lacuna`
+    Completions {
+        /// Shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page: `lacuna man | man -l -`
+    Man,
 }
 
 /// Runs the command with these arguments, of which the first is its name, and returns its exit code: 0, 1 if a run stopped, 2
@@ -248,6 +256,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Campaign { what } => campaign::campaign(&what),
         Verb::Work(asked) => work::run(&asked),
         Verb::New { what } => new::write(&what),
+        Verb::Completions { shell } => manual::completions(shell),
+        Verb::Man => manual::page(),
     };
     match result {
         Ok(()) if terminal::has_failed() => {

@@ -98,13 +98,27 @@ fn check(data: &Measurements, common: &[CommonError]) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Returns the unit of a variance.
+/// Returns the unit of a variance of values in a unit: K^2 for `degC`.
 pub fn squared(unit: &Unit) -> Result<Unit, Stop> {
-    let text = unit.to_string();
+    let text = unit.difference().to_string();
     let squared = match text.as_str() {
         "1" => "1".to_owned(),
         t if t.chars().all(char::is_alphabetic) => format!("{t}^2"),
         t => format!("({t})^2"),
     };
     Unit::parse(&squared).map_err(|e| Stop::new(format!("the unit of the variance: {e}")))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn a_variance_has_the_square_of_the_unit_of_differences() {
+        for (unit, expected) in [("1", "1"), ("m", "m^2"), ("m/s", "(m/s)^2"), ("degC", "K^2")] {
+            assert_eq!(squared(&Unit::parse(unit).unwrap()).unwrap().to_string(), expected);
+        }
+    }
 }

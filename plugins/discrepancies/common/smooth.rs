@@ -85,7 +85,7 @@ impl Smooth<'_> {
         let groups = groups.with_data(&replicates.measured);
         let mut hyper = Vec::new();
         let unit = vec![1.0; layout.len()];
-        let name = Unknown { name: "bias", unit: layout.unit.clone() };
+        let name = Unknown { name: "bias", unit: layout.unit.difference() };
         let size = |g: usize| start(&groups, &replicates, &unit, g).sqrt();
         let sd = PerGroup::new(self.bias, &groups, &name, size, &mut hyper);
         let name = Unknown { name: "correlation_length", unit: series.unit.clone() };

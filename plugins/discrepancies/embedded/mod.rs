@@ -114,7 +114,7 @@ impl Embedded {
             let Some(spread) = self.spread.get(&parameter.name) else { continue };
             let sd = parameter.scale();
             let slope = slopes.column(j).iter().map(|s| s / sd).collect();
-            let name = Unknown { name: "spread", unit: parameter.unit.clone() };
+            let name = Unknown { name: "spread", unit: parameter.unit.difference() };
             let group = Groups {
                 names: vec![parameter.name.clone()],
                 of: vec![Some(0); layout.len()],

@@ -71,7 +71,7 @@ impl Discrepancy for MultiplicativeGaussian {
         let name = Unknown { name: "relative", unit: Unit::dimensionless() };
         let relative = PerGroup::new(&self.relative, &groups, &name, begin, &mut hyper);
         let one = Groups::of(layout, &By::default()).map_err(Stop::new)?;
-        let name = Unknown { name: "floor", unit: layout.unit.clone() };
+        let name = Unknown { name: "floor", unit: layout.unit.difference() };
         let small = |g: usize| 0.1 * start(&one, &replicates, &unit, g).sqrt();
         let floor = self.floor.as_ref().map(|f| PerGroup::new(f, &one, &name, small, &mut hyper));
         Ok(Box::new(Proportional {

@@ -55,7 +55,7 @@ impl StudentLikelihood {
             Groups::of(layout, &options.by).map_err(Stop::new)?.with_data(&replicates.measured);
         let mut hyper = Vec::new();
         let unit = vec![1.0; layout.len()];
-        let name = Unknown { name: "scale", unit: layout.unit.clone() };
+        let name = Unknown { name: "scale", unit: layout.unit.difference() };
         let begin = |g: usize| start(&groups, &replicates, &unit, g).sqrt();
         let scale = PerGroup::new(&options.scale, &groups, &name, begin, &mut hyper);
         let one = Groups::of(layout, &By::default()).map_err(Stop::new)?;
