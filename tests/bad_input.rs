@@ -288,7 +288,7 @@ fn a_full_disk_loses_nothing() {
     let (kept, folder_of_runs) = saved.split_once(" of 40 runs in ").unwrap();
     assert_eq!(folder_of_runs, out.join("2-simulate").display().to_string());
     assert!((1..40).contains(&kept.parse::<usize>().unwrap()), "{full}");
-    assert!(mount("remount,size=20m"));
+    assert!(mount("remount,size=60m"));
     let ran = quick::run(&study, &[], &out).unwrap_or_else(|stop| panic!("{stop}"));
     assert_eq!(ran.made[0], "2-simulate");
     let whole = folder.path().join("whole");

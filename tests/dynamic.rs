@@ -23,6 +23,8 @@ mod panics;
 #[path = "quick.rs"]
 #[allow(dead_code, reason = "other tests use the rest")]
 mod quick;
+#[path = "dynamic/script_time.rs"]
+mod script_time;
 #[path = "dynamic/scripts.rs"]
 mod scripts;
 #[path = "slurm/mod.rs"]

@@ -21,7 +21,7 @@ pub struct Libraries {
     pub files: Vec<PathBuf>,
 }
 
-/// What `lacuna plugins` does besides listing.
+/// A deed of `lacuna plugins` besides listing.
 #[derive(clap::Subcommand)]
 pub enum Deed {
     /// Test the plugins of a library or a Python file against the contracts of their kinds

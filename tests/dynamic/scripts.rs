@@ -7,19 +7,17 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use lacuna::data::{Axis, Layout, Measurements, Replicate, Unit};
-use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::reader::MeasurementSource;
 use lacuna::plugin::registry::{self, Kind};
 use lacuna::plugin::{Discrepancy, Effect, Library, Model, Quantity, Reader, Sampler, Surrogate};
 use lacuna_engine::host::library;
-use lacuna_linalg::Matrix;
 
 use crate::contracts::{model, sound};
 use crate::quick;
 
 /// True if there is an interpreter.
-fn has_python() -> bool {
+pub fn has_python() -> bool {
     let required = std::env::var_os("LACUNA_REQUIRE_PYTHON").is_some_and(|value| value == "1");
     let named = std::env::var_os("LACUNA_PYTHON").is_some();
     assert!(named || !required, "LACUNA_PYTHON names no interpreter");
@@ -29,11 +27,11 @@ fn has_python() -> bool {
     named
 }
 
-fn example() -> PathBuf {
+pub fn example() -> PathBuf {
     quick::root().join("examples/plugin_python")
 }
 
-fn plugins() -> &'static Library {
+pub fn plugins() -> &'static Library {
     static LOADED: OnceLock<&'static Library> = OnceLock::new();
     LOADED.get_or_init(|| {
         library::load(&example().join("plugins.py"), None).unwrap_or_else(|e| panic!("{e}"))
@@ -236,7 +234,7 @@ fn a_study_of_python_parts_finds_the_truth_with_the_same_bits() {
     }
 }
 
-/// What a wrong file or a wrong answer is told as: with the name of the plugin, the file and the line.
+/// Wrong files are told with the name of the plugin and the line.
 #[test]
 fn what_is_wrong_is_told_with_its_place() {
     if !has_python() {
@@ -290,57 +288,6 @@ fn a_changed_file_replaces_its_plugins() {
     assert_eq!([value("curve.max()"), value("curve.min()")], [4.0, 3.0]);
 }
 
-/// Time of a likelihood of 120 walkers, 20 replicates and 1000 outputs through a worker, beside that of NumPy alone.
-///
-/// `cargo test --test dynamic -- --ignored --nocapture time_of_a_call`
-#[test]
-#[ignore = "a measurement for the guide"]
-fn time_of_a_call() {
-    if !has_python() {
-        return;
-    }
-    plugins();
-    let built = registry::from_text::<dyn Discrepancy>("heavy_tails", "").unwrap();
-    for (replicates, outputs) in [(20, 1000), (20, 100), (4, 21)] {
-        let axes =
-            vec![Axis::grid("t", (0..outputs).map(|i| i as f64).collect(), Unit::dimensionless())];
-        let layout = Layout { name: "y".to_owned(), unit: Unit::dimensionless(), axes };
-        let mut rng = Stream::root(1).generator();
-        let mut row = || (0..outputs).map(|_| Some(normal(&mut rng))).collect();
-        let all = (0..replicates).map(|r| Replicate::new(r.to_string(), row())).collect();
-        let data = Measurements::new(layout, all);
-        let made = built.plugin.likelihood(&Known::without_slopes(&data, &[])).unwrap();
-        let (responses, hyper) = (Matrix::zeros(120, outputs), Matrix::from_fn(120, 1, |_, _| 1.0));
-        let rounds = 20;
-        made.log_likelihoods(&responses, &hyper);
-        let begun = std::time::Instant::now();
-        (0..rounds).for_each(|_| _ = made.log_likelihoods(&responses, &hyper));
-        let whole = begun.elapsed().as_secs_f64() / f64::from(rounds);
-        let script = format!(
-            "import sys, time\nsys.path.insert(0, {root:?})\nsys.path.insert(0, {example:?})\n\
-             import types, numpy as np\nlacuna = types.ModuleType('lacuna')\n\
-             exec(open({plugin:?}).read(), lacuna.__dict__)\nsys.modules['lacuna'] = lacuna\n\
-             import plugins\np = lacuna.build(plugins.HeavyTails, {{}})\n\
-             class D: pass\nd = D()\nd.values = np.random.default_rng(1).standard_normal(({replicates}, {outputs}))\n\
-             d.count = np.full({outputs}, {replicates})\nr = np.zeros((120, {outputs}))\nu = {{'scale': np.ones(120)}}\n\
-             z = np.zeros({outputs})\np.log_likelihood(r, u, d, z)\nt = time.perf_counter()\n\
-             for _ in range({rounds}): p.log_likelihood(r, u, d, z)\nprint((time.perf_counter() - t) / {rounds})\n",
-            root = quick::root().join("python"),
-            example = example(),
-            plugin = quick::root().join("python/lacuna/plugin.py"),
-        );
-        let python = std::env::var_os("LACUNA_PYTHON").unwrap();
-        let output = std::process::Command::new(python).args(["-c", &script]).output().unwrap();
-        let alone: f64 = String::from_utf8_lossy(&output.stdout).trim().parse().unwrap();
-        let more = 100.0 * (whole / alone - 1.0);
-        println!(
-            "{replicates} x {outputs}: {:.2} ms, NumPy alone {:.2} ms, {more:.1} % more",
-            1e3 * whole,
-            1e3 * alone
-        );
-    }
-}
-
 /// Copies the example into a folder and shortens its chains; returns the study.
 fn copied(folder: &Path) -> PathBuf {
     for name in ["plugins.py", "study.toml", "activity.csv"] {
@@ -386,7 +333,7 @@ fn a_finished_run_needs_its_file_no_more() {
     }
 }
 
-/// What a changed file would compute from the same draws is computed again, though the draws have the same bits.
+/// Results that a changed file would compute from the same draws are computed again, though the draws have the same bits.
 #[test]
 fn what_follows_from_a_changed_file_is_computed_again() {
     if !has_python() {

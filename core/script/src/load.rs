@@ -8,10 +8,9 @@ use lacuna::plugin::registry::loaded::{self, AnyEntry};
 use lacuna::run::files;
 use lacuna_abi::record::is_word;
 use lacuna_run::process::interpreter;
-use serde::Deserialize;
-use serde_json::{Map, Value as Json};
+use serde_json::Value as Json;
 
-use crate::offer::offer;
+use crate::offer::{Declared, offer};
 use crate::script::Script;
 use crate::worker::Worker;
 
@@ -38,19 +37,6 @@ impl Loaded {
     fn rivals(&self, other: &Self) -> bool {
         other.library.plugins.iter().any(|plugin| self.library.plugins.contains(plugin))
     }
-}
-
-/// A plugin as its file declares it.
-#[derive(Deserialize)]
-pub(crate) struct Declared {
-    /// Kind of the plugin.
-    pub kind: String,
-    /// Name in studies.
-    pub name: String,
-    /// JSON Schema of its options.
-    pub schema: Map<String, Json>,
-    /// Optional methods that it has.
-    pub has: Vec<String>,
 }
 
 /// Loads a file, or finds that it is loaded as it is now: its code runs from here on. It takes the place of what it was before

@@ -9,11 +9,11 @@ use serde_json::{Map, Value as Json};
 /// A message.
 #[derive(Debug, Clone, Default)]
 pub struct Message {
-    /// What it says in JSON.
+    /// Head, in JSON.
     pub head: Map<String, Json>,
-    /// Its matrices.
+    /// Matrices.
     pub matrices: Vec<Matrix>,
-    /// Its bytes.
+    /// Bytes.
     pub bytes: Vec<u8>,
 }
 

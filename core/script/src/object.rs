@@ -28,7 +28,7 @@ pub struct Object {
     conditions: Memo<Conditions, Arc<Recipe>>,
 }
 
-/// What many requests share: the names of the numbers, the layout and the scenario.
+/// Conditions that many requests share: the names of the numbers, the layout and the scenario.
 #[derive(PartialEq)]
 struct Conditions {
     names: Vec<String>,
@@ -36,7 +36,7 @@ struct Conditions {
     scenario: Option<Scenario>,
 }
 
-/// What is asked of an object, with its arguments.
+/// A question to an object, with its arguments.
 #[derive(Default)]
 pub struct Call<'a> {
     /// Name of the call.
@@ -193,7 +193,7 @@ fn told(what: &str, refusal: Refusal) -> Refusal {
     Refusal { message: format!("`{what}`: {}", refusal.message), ..refusal }
 }
 
-/// What a plugin answers in JSON.
+/// Answer of a plugin in JSON.
 pub fn answer<T: DeserializeOwned>(message: &Message) -> Result<T, Refusal> {
     let json = message.head.get("answer").cloned().unwrap_or_default();
     serde_json::from_value(json)

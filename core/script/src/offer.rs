@@ -11,11 +11,24 @@ use lacuna_abi::options::Options;
 use lacuna_abi::wire::{Complaint, json_of_node, table_of_json};
 use lacuna_abi::{Refusal, status};
 use schemars::{Schema, SchemaGenerator};
-use serde_json::Value as Json;
+use serde::Deserialize;
+use serde_json::{Map, Value as Json};
 
-use crate::load::Declared;
 use crate::object::{Object, Plugin};
 use crate::script::Script;
+
+/// A plugin as its file declares it.
+#[derive(Deserialize)]
+pub(crate) struct Declared {
+    /// Kind of the plugin.
+    pub kind: String,
+    /// Name in studies.
+    pub name: String,
+    /// JSON Schema of its options.
+    pub schema: Map<String, Json>,
+    /// Optional methods that it has.
+    pub has: Vec<String>,
+}
 
 /// The entry of a plugin; the error says why it cannot be one.
 pub(crate) fn offer(

@@ -14,14 +14,14 @@ use serde_json::{Value as Json, json};
 use crate::message::Message;
 use crate::object::{Call, Plugin, answer, matrices, row};
 
-/// What a step says beside its numbers.
+/// Answer of a step beside its numbers.
 #[derive(Deserialize)]
 struct Stepped {
     evaluations: u64,
     memory: Json,
 }
 
-/// What holds for all runs of a sampler.
+/// Properties of all runs of a sampler.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct Traits {

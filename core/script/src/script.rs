@@ -48,9 +48,9 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 pub struct Request<'a> {
     /// The object.
     pub object: &'a Arc<Recipe>,
-    /// What is done with it, and arguments.
+    /// Name of what is done with it, and arguments.
     pub head: Map<String, Json>,
-    /// What the head leaves out: conditions that many requests share.
+    /// Conditions that many requests share, which the head leaves out.
     pub known: Option<&'a Arc<Recipe>>,
     /// Numbers.
     pub matrices: &'a [&'a Matrix],

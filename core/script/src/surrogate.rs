@@ -23,7 +23,7 @@ struct Fitted {
     has_variance: bool,
 }
 
-/// What is kept of an emulator beside what Python makes of it.
+/// Parts of an emulator that are kept, with what Python makes of it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Kept {
     dimension: usize,

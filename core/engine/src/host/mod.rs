@@ -17,6 +17,7 @@ mod offer;
 mod plugin;
 mod quantity;
 mod reader;
+pub mod recorded;
 mod sampler;
 mod surrogate;
 mod target;

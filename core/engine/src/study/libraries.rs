@@ -13,8 +13,7 @@ use schemars::JsonSchema;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
-use crate::host::{declared, library};
-use crate::stage::manifest;
+use crate::host::{declared, library, recorded};
 
 /// Plugins from third parties, in libraries or in Python files. Their code runs with all rights of the program: load only libraries you trust.
 /// `lacuna check STUDY` lists the libraries without loading them.
@@ -34,6 +33,9 @@ pub struct PluginsSection {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interpreter: Option<PathBuf>,
 }
+
+/// Key of the Python files.
+const PYTHON: &str = stringify!(python);
 
 /// One file or several.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -208,17 +210,17 @@ pub(super) fn libraries(
         let section: PluginsSection = decode(node, problems)?;
         let before = problems.len();
         let mut libraries = Libraries::default();
-        let several = node.get("python").is_some_and(|node| matches!(node.value, Value::Array(_)));
+        let several = node.get(PYTHON).is_some_and(|node| matches!(node.value, Value::Array(_)));
         let load = section.load.iter().enumerate().map(|(i, file)| (file, format!("load.{i}")));
         let python = section.python.0.iter().enumerate().map(|(i, file)| {
-            (file, if several { format!("python.{i}") } else { "python".to_owned() })
+            (file, if several { format!("{PYTHON}.{i}") } else { PYTHON.to_owned() })
         });
         for (file, key) in load.chain(python) {
-            let in_python = key.starts_with("python") || library::is_python(&file.path);
+            let in_python = key.starts_with(PYTHON) || library::is_python(&file.path);
             let interpreter = section.interpreter.as_deref();
             let as_python = in_python.then_some(interpreter);
             if let Err(reason) = bring(file, as_python, directory, purpose, &mut libraries) {
-                let known = || manifest::library(run, &directory.join(&file.path));
+                let known = || recorded::library(run, &directory.join(&file.path));
                 if let Some(library) = (purpose == Use::Look).then(known).flatten() {
                     libraries.absent.push(library);
                     continue;

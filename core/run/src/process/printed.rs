@@ -1,4 +1,4 @@
-//! What a process prints, of which the end is kept for messages.
+//! Output of a process, of which the end is kept for messages.
 
 use std::io::Read;
 use std::sync::mpsc::{self, Receiver};

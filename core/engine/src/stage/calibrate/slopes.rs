@@ -16,7 +16,7 @@ const STEP: f64 = 1e-4;
 /// Largest difference that is no contradiction, as a part of the derivative.
 const TOLERANCE: f64 = 0.1;
 
-/// What contradicts the gradient of a density, in words: differences along a random direction at two draws of the prior, of two
+/// Contradiction of the gradient of a density, in words: by differences along a random direction at two draws of the prior, of two
 /// steps, so that their own error is known. `None` if nothing does, or the density cannot be evaluated there.
 pub(super) fn contradiction(
     target: &dyn Target,
