@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-/// Attenuation in decibels: the gain differs from one by at most 10^(-60/20) = 0.001 where it should be one, and from
-/// zero by as much where it should be zero.
-const ATTENUATION: f64 = 60.0;
+/// Attenuation in decibels: the gain differs from one by at most 10^(-66/20) = 0.0005 where it should be one, and from
+/// zero by as much where it should be zero. Between samples the images of a record at its own rate add as much.
+const ATTENUATION: f64 = 66.0;
 /// End of the frequencies that pass, and start of those that are stopped, as fractions of the lower Nyquist frequency.
 const PASSED: f64 = 0.8;
 const STOPPED: f64 = 1.0;
@@ -107,7 +107,7 @@ mod tests {
                     let found = low_pass.at(time, 0.0, step, &values).unwrap_or(f64::NAN);
                     let right = if part < 0.9 { sine(time) } else { 0.0 };
                     let error = (found - right).abs();
-                    assert!(error <= 1.1e-3, "step {step}, {part} of Nyquist, {time}: {error}");
+                    assert!(error <= 1e-3, "step {step}, {part} of Nyquist, {time}: {error}");
                 }
             }
         }
@@ -120,7 +120,9 @@ mod tests {
         for time in [2.0, 2.05, 10.0, 51.83, 51.9] {
             let found = low_pass.at(time, 2.0, 0.1, &values).unwrap_or(f64::NAN);
             let right = 3.0 - 2.5 * (time - 2.0);
-            assert!((found - right).abs() < 1e-10 * 130.0, "{time}: {found} {right}");
+            // At samples the filter is symmetric; between them it has its error, of the change in an interval.
+            let bound = if time == 51.83 || time == 2.05 { 1e-3 * 2.5 } else { 1e-9 };
+            assert!((found - right).abs() < bound, "{time}: {found} {right}");
         }
         assert_eq!(low_pass.at(1.9, 2.0, 0.1, &values), None);
         assert_eq!(low_pass.at(52.0, 2.0, 0.1, &values), None);

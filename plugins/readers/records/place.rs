@@ -19,7 +19,7 @@ pub enum Resample {
     Linear,
     /// Low-pass filter before the record is read at the response's times: a sinc function under a Kaiser window that
     /// passes frequencies up to 0.8 of the Nyquist frequency of the slower of the two rates, and stops those above it, both to
-    /// 0.001. The filter reaches over 18 intervals of the slower rate to both sides; beyond its ends a record is continued
+    /// 0.001. The filter reaches over 21 intervals of the slower rate to both sides; beyond its ends a record is continued
     /// by its point reflection. The samples and the response's times must be equally spaced.
     Filtered,
 }
