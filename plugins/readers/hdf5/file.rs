@@ -18,7 +18,7 @@ const MOST: usize = 100_000;
 /// An open file.
 pub(crate) struct File {
     path: PathBuf,
-    file: Hdf5File,
+    content: Hdf5File,
     names: Vec<String>,
 }
 
@@ -38,14 +38,14 @@ impl File {
         file.root_group()
             .and_then(|root| list(&root, "", &mut Vec::new(), &mut names))
             .map_err(broken)?;
-        Ok(Self { path: path.to_owned(), file, names })
+        Ok(Self { path: path.to_owned(), content: file, names })
     }
 
     /// Returns true for a file of the netCDF library, of which dimensions are datasets.
     pub fn is_netcdf(&self) -> bool {
-        let Ok(root) = self.file.root_group() else { return false };
+        let Ok(root) = self.content.root_group() else { return false };
         let scale = |name: &String| {
-            let class = self.file.dataset(name).ok().and_then(|d| d.attribute("CLASS").ok());
+            let class = self.content.dataset(name).ok().and_then(|d| d.attribute("CLASS").ok());
             class
                 .and_then(|c| c.read_string().ok())
                 .is_some_and(|c| c.starts_with("DIMENSION_SCALE"))
@@ -54,7 +54,7 @@ impl File {
     }
 
     fn dataset(&self, name: &str) -> Result<Dataset, ReadError> {
-        self.file.dataset(name).map_err(|e| self.broken(name, &e.to_string()))
+        self.content.dataset(name).map_err(|e| self.broken(name, &e.to_string()))
     }
 
     fn broken(&self, name: &str, reason: &str) -> ReadError {
@@ -119,7 +119,9 @@ impl Store for File {
         let scale = number(&dataset, "scale_factor").unwrap_or(1.0);
         let offset = number(&dataset, "add_offset").unwrap_or(0.0);
         if scale != 1.0 || offset != 0.0 {
-            values.iter_mut().for_each(|x| *x = scale * *x + offset);
+            for x in &mut values {
+                *x = scale * *x + offset;
+            }
         }
         let unit = text(&dataset, "units").or_else(|| text(&dataset, "unit"));
         Ok(Array { shape, values, unit })

@@ -9,7 +9,7 @@ use crate::readers::records::store::{Array, Store};
 
 /// An open file.
 pub(super) struct File {
-    file: file::File,
+    content: file::File,
     names: Vec<String>,
 }
 
@@ -19,13 +19,13 @@ impl File {
         // The group `#refs#` holds the elements of cell arrays, without their names.
         let own = file.names().iter().filter(|name| !name.starts_with('#'));
         let names = own.map(|name| name.replace('/', ".")).collect();
-        Ok(Self { file, names })
+        Ok(Self { content: file, names })
     }
 }
 
 impl Store for File {
     fn path(&self) -> &Path {
-        self.file.path()
+        self.content.path()
     }
 
     fn format(&self) -> String {
@@ -37,7 +37,7 @@ impl Store for File {
     }
 
     fn array(&self, name: &str) -> Result<Array, ReadError> {
-        let mut array = self.file.array(&name.replace('.', "/"))?;
+        let mut array = self.content.array(&name.replace('.', "/"))?;
         array.shape.reverse();
         Ok(Array::from_columns(array.shape, &array.values, array.unit))
     }

@@ -27,16 +27,15 @@ impl Reading<'_> {
             return Err(self.at(name, format!("has no numbers, its shape is {:?}", values.shape)));
         }
         let axes = &self.layout.axes;
-        let written: Vec<&str> = match &self.options.axes {
-            Some(written) => written.iter().map(String::as_str).collect(),
-            None => {
-                let own = self.inside.iter().copied().chain(self.grid.map(|(i, ..)| i));
-                let mut own: Vec<usize> = own.collect();
-                own.sort_unstable();
-                let more = !single && values.squeezed(own.len() + 1).len() > own.len();
-                let outer = more.then_some(REPLICATES);
-                outer.into_iter().chain(own.iter().map(|&i| axes[i].name.as_str())).collect()
-            }
+        let written: Vec<&str> = if let Some(written) = &self.options.axes {
+            written.iter().map(String::as_str).collect()
+        } else {
+            let own = self.inside.iter().copied().chain(self.grid.map(|(i, ..)| i));
+            let mut own: Vec<usize> = own.collect();
+            own.sort_unstable();
+            let more = !single && values.squeezed(own.len() + 1).len() > own.len();
+            let outer = more.then_some(REPLICATES);
+            outer.into_iter().chain(own.iter().map(|&i| axes[i].name.as_str())).collect()
         };
         let shape = values.squeezed(written.len());
         if shape.len() != written.len() {

@@ -1,5 +1,6 @@
 //! Arrays in memory, read as groups and stacked, on the axis and off it.
 #![allow(clippy::unwrap_used)]
+#![allow(clippy::unnecessary_wraps, reason = "the form of `Open`")]
 
 use std::f64::consts::PI;
 use std::path::Path;
