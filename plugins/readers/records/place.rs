@@ -77,7 +77,7 @@ impl Trigger {
 pub struct Placed {
     /// Values; `None` where the sample is missing, or the record has none.
     pub values: Vec<Option<f64>>,
-    /// Whether the record reaches each place.
+    /// True for each place that the record reaches.
     pub reached: Vec<bool>,
 }
 

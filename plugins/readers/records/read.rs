@@ -13,11 +13,11 @@ use crate::readers::listed;
 /// The replicates of a file.
 pub(super) struct Read {
     pub replicates: Vec<Replicate>,
-    /// Whether a record reaches each value of the layout, even if the value is missing.
+    /// True for each value of the layout that a record reaches, even if the value is missing.
     pub reached: Vec<bool>,
 }
 
-/// What is read from a file, and how.
+/// A file, the options of its reading, and the layout to which it is read.
 pub(super) struct Reading<'a> {
     pub options: &'a Records,
     pub store: &'a dyn Store,
