@@ -1,6 +1,7 @@
 //! The `lacuna` command: arguments and printing, no numerics.
 
 mod campaign;
+mod convert;
 mod coverage;
 mod gap;
 mod inspect;
@@ -173,6 +174,13 @@ enum Verb {
         #[command(flatten)]
         libraries: plugins::Libraries,
     },
+    /// Write the draws of a finished run as a CSV table: chain, draw, unknowns, log density
+    Convert {
+        /// Run directory
+        run: PathBuf,
+        /// Table to write, or `-` for the terminal
+        out: PathBuf,
+    },
     /// Serve a study's model, emulator and posterior over UM-Bridge, until Ctrl-C
     Serve {
         /// Study file
@@ -242,6 +250,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             let (reader, variable) = (reader.as_deref(), variable.as_deref());
             inspect::inspect(&file, reader, variable, csv.as_deref(), &libraries)
         }
+        Verb::Convert { run, out } => convert::convert(&run, &out),
         Verb::Serve { study, settings, out, place } => {
             serve::serve(&study, &settings, out.as_deref(), &place)
         }
