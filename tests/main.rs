@@ -8,6 +8,7 @@ mod bad_input;
 mod browser;
 mod campaign;
 mod commands;
+mod convert;
 mod coverage;
 mod cut;
 mod dependencies;
