@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use lacuna::plugin::reader::MeasurementSource;
+
 use crate::quick;
 
 #[test]
@@ -34,11 +36,32 @@ fn the_table_of_draws_has_the_means_of_the_summary() {
 }
 
 #[test]
+fn the_table_of_measurements_is_read_back_to_the_same_bits() {
+    let folder = quick::tables();
+    let study = folder.path().join("study.toml");
+    let table = folder.path().join("long.csv");
+    let done = quick::command().arg("convert").args([&study, &table]).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let read = |settings: &[&str]| {
+        let study = quick::load(&study, settings);
+        let source = MeasurementSource {
+            directory: &study.directory,
+            scenario: None,
+            layout: &study.layouts.blocks[0],
+        };
+        study.measurements.as_ref().unwrap().built.plugin.measurements(&source).unwrap()
+    };
+    let again = read(&["measurements.path=long.csv"]);
+    assert!(again.count() > 0);
+    assert_eq!(again, read(&[]));
+}
+
+#[test]
 fn what_has_no_draws_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (run, out, code, right) in [
         (".", "draws.txt", 2, "`draws.txt` does not end in `.csv`"),
-        ("nowhere", "draws.csv", 2, "`nowhere` is not a run directory"),
+        ("nowhere", "draws.csv", 2, "`nowhere` is neither a run directory nor a study"),
         (".", "draws.csv", 1, ". has no draws"),
     ] {
         let done = quick::command()

@@ -174,10 +174,12 @@ enum Verb {
         #[command(flatten)]
         libraries: plugins::Libraries,
     },
-    /// Write the draws of a finished run as a CSV table: chain, draw, unknowns, log density
+    /// Write a CSV table: of a run directory the draws (chain, draw, unknowns, log density), of a study its measurements
     Convert {
-        /// Run directory
-        run: PathBuf,
+        /// Run directory, or study file
+        source: PathBuf,
+        #[command(flatten)]
+        settings: study::Settings,
         /// Table to write, or `-` for the terminal
         out: PathBuf,
     },
@@ -250,7 +252,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             let (reader, variable) = (reader.as_deref(), variable.as_deref());
             inspect::inspect(&file, reader, variable, csv.as_deref(), &libraries)
         }
-        Verb::Convert { run, out } => convert::convert(&run, &out),
+        Verb::Convert { source, settings, out } => convert::convert(&source, &settings, &out),
         Verb::Serve { study, settings, out, place } => {
             serve::serve(&study, &settings, out.as_deref(), &place)
         }
