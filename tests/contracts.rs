@@ -308,6 +308,10 @@ fn sound_files(name: &str, reader: &dyn Reader, folder: &Path) -> Vec<Sample> {
         tolerance,
     };
     match name {
+        "hdf5" => vec![sample(samples().join("records.h5"), 1e-12)],
+        "matlab" => ["records.mat", "records_plain.mat", "records_73.mat"]
+            .map(|file| sample(samples().join(file), 1e-12))
+            .to_vec(),
         "netcdf" => {
             let response = model::Response { values: values.clone(), valid: true, facts: vec![] };
             let file = write_response(folder, "sound", &layout, &response).unwrap();
@@ -337,8 +341,19 @@ fn sound_files(name: &str, reader: &dyn Reader, folder: &Path) -> Vec<Sample> {
 
 #[test]
 fn readers() {
-    let table: &Table =
-        &[("csv", &[""]), ("netcdf", &[""]), ("sierra", &["variable = \"strain_{sensor}\""])];
+    let table: &Table = &[
+        ("csv", &[""]),
+        ("hdf5", &["dataset = \"strain_{sensor}\"\ntime = \"time\""]),
+        (
+            "matlab",
+            &[
+                "dataset = \"record.strain\"\naxes = [\"time\", \"sensor\"]\ntime = \"record.t\"\ntime_unit = \"ms\"\n\
+               unit = \"microstrain\"",
+            ],
+        ),
+        ("netcdf", &[""]),
+        ("sierra", &["variable = \"strain_{sensor}\""]),
+    ];
     let folder = tempfile::tempdir().unwrap();
     all::<dyn Reader>(table, |case, reader| {
         let samples = sound_files(case.plugin, reader, folder.path());

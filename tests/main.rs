@@ -9,6 +9,7 @@ mod browser;
 mod campaign;
 mod celsius;
 mod commands;
+mod convert;
 mod coverage;
 mod cut;
 mod dependencies;

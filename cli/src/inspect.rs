@@ -135,7 +135,7 @@ fn csv(table: &Table) -> String {
     text
 }
 
-fn quoted(name: &str) -> String {
+pub fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n']) {
         format!("\"{}\"", name.replace('"', "\"\""))
     } else {

@@ -1,6 +1,7 @@
 //! The `lacuna` command: arguments and printing, no numerics.
 
 mod campaign;
+mod convert;
 mod coverage;
 mod gap;
 mod inspect;
@@ -174,6 +175,15 @@ enum Verb {
         #[command(flatten)]
         libraries: plugins::Libraries,
     },
+    /// Write a CSV table: of a run directory the draws (chain, draw, unknowns, log density), of a study its measurements
+    Convert {
+        /// Run directory, or study file
+        source: PathBuf,
+        #[command(flatten)]
+        settings: study::Settings,
+        /// Table to write, or `-` for the terminal
+        out: PathBuf,
+    },
     /// Serve a study's model, emulator and posterior over UM-Bridge, until Ctrl-C
     Serve {
         /// Study file
@@ -250,6 +260,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             let (reader, variable) = (reader.as_deref(), variable.as_deref());
             inspect::inspect(&file, reader, variable, csv.as_deref(), &libraries)
         }
+        Verb::Convert { source, settings, out } => convert::convert(&source, &settings, &out),
         Verb::Serve { study, settings, out, place } => {
             serve::serve(&study, &settings, out.as_deref(), &place)
         }

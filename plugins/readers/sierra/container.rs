@@ -244,7 +244,8 @@ fn classic_slice(picks: &[Pick]) -> NcSliceInfo {
     NcSliceInfo { selections }
 }
 
-fn hdf5_reals(dataset: &Dataset, picks: &[Pick]) -> Result<Vec<f64>, String> {
+/// Reads a part of a dataset as numbers, last dimension fastest.
+pub(crate) fn hdf5_reals(dataset: &Dataset, picks: &[Pick]) -> Result<Vec<f64>, String> {
     fn read<T: hdf5_reader::H5Type + Copy>(
         dataset: &Dataset,
         picks: &[Pick],
