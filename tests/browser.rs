@@ -24,7 +24,8 @@ fn chromium(folder: &Path, arguments: &[String]) -> Option<(String, String)> {
     let (out, err) = (folder.join("stdout"), folder.join("stderr"));
     let mut browser = Command::new("chromium");
     browser
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"])
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"])
+        .arg("--allow-file-access-from-files")
         .args(["--enable-logging=stderr", "--window-size=1400,2000"])
         .arg(format!("--user-data-dir={}", folder.join("profile").display()))
         .args(arguments)

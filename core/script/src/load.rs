@@ -111,6 +111,8 @@ fn bring(file: &Path, sha256: String, python: &Path, others: &[Loaded]) -> Resul
         others.iter().map(|other| (other.origin(), loaded::remove(&other.origin()))).collect();
     let offered: Result<Vec<_>, String> =
         declared.into_iter().map(|plugin| offer(plugin, &script, library)).collect();
-    removed.into_iter().for_each(|(origin, entries)| loaded::add(&origin, entries));
+    for (origin, entries) in removed {
+        loaded::add(&origin, entries);
+    }
     Ok(Loaded { python: python.to_owned(), library, entries: offered? })
 }

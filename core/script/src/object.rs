@@ -275,7 +275,9 @@ impl Component for Plugin {
         match self.0.ask(&Call::new("check", &[]).about(context)) {
             Ok(_) => {}
             Err(refusal) if refusal.status == status::REJECTED => {
-                Complaint::read(&refusal.message).into_iter().for_each(|c| c.report(complaints));
+                for complaint in Complaint::read(&refusal.message) {
+                    complaint.report(complaints);
+                }
             }
             Err(refusal) => {
                 complaints.at("").say(self.0.said(&refusal));

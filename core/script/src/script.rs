@@ -159,7 +159,9 @@ fn answer(
         head.insert("known".to_owned(), json!(known.id));
     }
     if !gone.is_empty() {
-        gone.iter().for_each(|id| _ = worker.objects.remove(id));
+        for id in &gone {
+            worker.objects.remove(id);
+        }
         head.insert("forget".to_owned(), json!(gone));
     }
     worker.say(&head, request.matrices, request.bytes);

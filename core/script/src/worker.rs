@@ -86,13 +86,11 @@ impl Worker {
 
     /// The next message; the error says how the worker ended.
     pub fn hear(&mut self) -> Result<Message, String> {
-        match Message::read(&mut self.answers) {
-            Ok(Some(message)) => Ok(message),
-            Ok(None) | Err(_) => {
-                let status = self.process.wait(Some(Duration::from_secs(1)));
-                Err(ending(status.ok().flatten(), &self.printed))
-            }
+        if let Ok(Some(message)) = Message::read(&mut self.answers) {
+            return Ok(message);
         }
+        let status = self.process.wait(Some(Duration::from_secs(1)));
+        Err(ending(status.ok().flatten(), &self.printed))
     }
 
     /// Sends a message. A worker that does not read any more has ended, which explains the missing answer.

@@ -38,7 +38,7 @@ use super::sierra::signal::is_exodus;
 /// axes = ["replicate", "sensor", "time"]
 /// labels = { sensor = ["B", "C", "reference"] }
 /// step = 1
-/// time_unit = "microseconds"
+/// time_unit = "us"
 /// resample = "filtered"
 /// trigger = { channel = "beam", level = 0.5 }
 /// ```
