@@ -17,7 +17,7 @@ pub fn print_styled(text: &str) {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            FAILED.store(true, Ordering::Relaxed)
+            FAILED.store(true, Ordering::Relaxed);
         }
         // Who closes a pipe has read enough.
         _ => {}

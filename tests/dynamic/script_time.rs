@@ -10,7 +10,7 @@ use lacuna_linalg::Matrix;
 use crate::quick;
 use crate::scripts::{example, has_python, plugins};
 
-/// Time of a likelihood of 120 walkers, 20 replicates and 1000 outputs through a worker, beside that of NumPy alone.
+/// Time of a likelihood of 120 walkers, 20 replicates and 1000 outputs through a worker, beside that of `numpy` alone.
 ///
 /// `cargo test --test dynamic -- --ignored --nocapture time_of_a_call`
 #[test]

@@ -1,6 +1,6 @@
 //! Plugins in Python: the suites of the kinds, a study that uses all of them, and files that are wrong.
 //!
-//! `LACUNA_PYTHON` names an interpreter that has NumPy; without it the tests report that they are skipped, unless
+//! `LACUNA_PYTHON` names an interpreter that has `numpy`; without it the tests report that they are skipped, unless
 //! `LACUNA_REQUIRE_PYTHON=1` makes that a failure.
 
 use std::path::{Path, PathBuf};

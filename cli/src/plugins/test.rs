@@ -1,4 +1,8 @@
 //! Command `plugins test`: the contracts of the kinds, applied to the plugins of a file.
+#![allow(
+    clippy::redundant_closure,
+    reason = "a suite takes a trait object of one lifetime, and the closure that calls it of any"
+)]
 
 use std::path::{Path, PathBuf};
 
@@ -70,7 +74,9 @@ pub fn run(asked: &Test) -> anyhow::Result<()> {
         }
         failed += 1;
         print(&format!("{full}  BREAKS its contract"));
-        breaches.iter().for_each(|breach| print(&format!("  {breach}")));
+        for breach in breaches {
+            print(&format!("  {breach}"));
+        }
     }
     match failed {
         0 => Ok(()),

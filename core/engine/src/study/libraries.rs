@@ -24,7 +24,7 @@ pub struct PluginsSection {
     /// `[{ path = "./libmatern.so", sha256 = "…" }]`. No search path is used.
     pub load: Vec<LibraryFile>,
     /// Python files of plugins, relative to the study: `"mine.py"`, or several in an array; with the hash that a file must have
-    /// as in `load`. NumPy has to be installed.
+    /// as in `load`. `numpy` has to be installed.
     #[serde(skip_serializing_if = "Files::is_empty")]
     pub python: Files,
     /// Python interpreter of these files: a path relative to the study with a `/`, the directory of a virtual environment, or
@@ -218,8 +218,8 @@ pub(super) fn libraries(
         for (file, key) in load.chain(python) {
             let in_python = key.starts_with(PYTHON) || library::is_python(&file.path);
             let interpreter = section.interpreter.as_deref();
-            let as_python = in_python.then_some(interpreter);
-            if let Err(reason) = bring(file, as_python, directory, purpose, &mut libraries) {
+            let form = if in_python { Form::Python { interpreter } } else { Form::Library };
+            if let Err(reason) = bring(file, form, directory, purpose, &mut libraries) {
                 let known = || recorded::library(run, &directory.join(&file.path));
                 if let Some(library) = (purpose == Use::Look).then(known).flatten() {
                     libraries.absent.push(library);
@@ -254,11 +254,17 @@ fn twice(loaded: &[&'static Library]) -> Vec<(String, String)> {
     found
 }
 
-/// Looks at a file and, unless the study is only checked, loads it; `python` says that it is one of plugins in Python, and
-/// names its interpreter.
+/// Form of a file of plugins.
+#[derive(Clone, Copy)]
+enum Form<'a> {
+    Library,
+    Python { interpreter: Option<&'a Path> },
+}
+
+/// Looks at a file and, unless the study is only checked, loads it.
 fn bring(
     file: &LibraryFile,
-    python: Option<Option<&Path>>,
+    form: Form<'_>,
     directory: &Path,
     purpose: Use,
     libraries: &mut Libraries,
@@ -267,18 +273,18 @@ fn bring(
     let bytes = std::fs::read(&path).map_err(|error| files::in_words(&error))?;
     let sha256 = files::hash(&bytes);
     library::pinned(&sha256, file.sha256.as_deref())?;
-    let record = match python {
-        Some(_) => Some(lacuna_script::record(&String::from_utf8_lossy(&bytes))),
-        None => record::find(&bytes),
+    let record = match form {
+        Form::Python { .. } => Some(lacuna_script::record(&String::from_utf8_lossy(&bytes))),
+        Form::Library => record::find(&bytes),
     };
     libraries.seen.push(Seen { path: file.path.clone(), sha256, record });
     if purpose == Use::Check {
         return Ok(());
     }
     let pin = file.sha256.as_deref();
-    libraries.loaded.push(match python {
-        Some(interpreter) => library::load_python(&path, pin, interpreter, directory)?,
-        None => library::load(&path, pin)?,
+    libraries.loaded.push(match form {
+        Form::Python { interpreter } => library::load_python(&path, pin, interpreter, directory)?,
+        Form::Library => library::load(&path, pin)?,
     });
     Ok(())
 }
