@@ -59,15 +59,27 @@ fn a_check_says_what_would_be_loaded() {
     let library = folder.path().join("libheard.so");
     std::fs::write(&library, "lacuna-plugin-record:1.0\ndiscrepancy=heard\nend\n").unwrap();
     quick::replace(&study, "use = \"gaussian\"", "use = \"heard\"");
-    let (done, text) = said(&["check", path(&study), "--plugin", path(&library)]);
+    let text = std::fs::read_to_string(&study).unwrap();
+    std::fs::write(&study, format!("{text}\n[plugins]\nload = [\"libheard.so\"]\n")).unwrap();
+    let (done, text) = said(&["check", path(&study)]);
     assert!(done, "{text}");
-    let expected =
-        format!("would load {}: discrepancy `heard`, abi 1.0, sha256 ", library.display());
-    assert!(text.starts_with(&expected) && text.contains("no problems"), "{text}");
+    let expected = "would load libheard.so: discrepancy `heard`, abi 1.0, sha256 ";
+    assert!(text.starts_with(expected) && text.contains("no problems"), "{text}");
     std::fs::write(&library, "something else").unwrap();
-    let (done, text) = said(&["check", path(&study), "--plugin", path(&library)]);
+    let (done, text) = said(&["check", path(&study)]);
     assert!(!done && text.contains("it says nothing of itself"), "{text}");
     assert!(text.contains("there is no discrepancy `heard`"), "{text}");
+}
+
+/// A library that the command line names is loaded, so that the options of its plugins are checked.
+#[test]
+fn a_check_loads_what_the_command_line_names() {
+    let folder = quick::tables();
+    let study = folder.path().join("study.toml");
+    quick::replace(&study, "use = \"gaussian\"", "use = \"twin_gaussian\"\nunheard_of = 1");
+    let library = twin_path();
+    let (done, text) = said(&["check", path(&study), "--plugin", path(&library)]);
+    assert!(!done && text.contains("unknown key `unheard_of`"), "{text}");
 }
 
 #[test]
