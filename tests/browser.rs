@@ -19,31 +19,37 @@ const CHECKS: &str = include_str!("browser/checks.js");
 /// Width of the window in pixels, and colours.
 const VIEWS: [(u32, &str); 4] = [(360, "light"), (1280, "light"), (1280, "dark"), (360, "dark")];
 
+/// Starts of a browser that hangs, which it does now and then where many processes are at work, and the time of each.
+const STARTS: usize = 4;
+const PATIENCE: Duration = Duration::from_secs(60);
+
 /// Output and messages of the browser; `None` if there is none.
 fn chromium(folder: &Path, arguments: &[String]) -> Option<(String, String)> {
     let (out, err) = (folder.join("stdout"), folder.join("stderr"));
-    let mut browser = Command::new("chromium");
-    browser
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"])
-        .arg("--allow-file-access-from-files")
-        .args(["--enable-logging=stderr", "--window-size=1400,2000"])
-        .arg(format!("--user-data-dir={}", folder.join("profile").display()))
-        .args(arguments)
-        .stdout(fs::File::create(&out).unwrap())
-        .stderr(fs::File::create(&err).unwrap())
-        .stdin(Stdio::null());
-    let mut running = browser.spawn().ok()?;
-    let begin = Instant::now();
-    while running.try_wait().unwrap().is_none() {
-        if begin.elapsed() > Duration::from_secs(120) {
-            running.kill().unwrap();
-            running.wait().unwrap();
-            panic!("chromium did not end: {}", fs::read_to_string(&err).unwrap());
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    }
     let read = |path: &Path| String::from_utf8_lossy(&fs::read(path).unwrap()).into_owned();
-    Some((read(&out), read(&err)))
+    for start in 0..STARTS {
+        let mut browser = Command::new("chromium");
+        browser
+            .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"])
+            .args(["--allow-file-access-from-files", "--enable-logging=stderr"])
+            .arg("--window-size=1400,2000")
+            .arg(format!("--user-data-dir={}", folder.join(format!("profile{start}")).display()))
+            .args(arguments)
+            .stdout(fs::File::create(&out).unwrap())
+            .stderr(fs::File::create(&err).unwrap())
+            .stdin(Stdio::null());
+        let mut running = browser.spawn().ok()?;
+        let begin = Instant::now();
+        while running.try_wait().unwrap().is_none() && begin.elapsed() < PATIENCE {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        if running.try_wait().unwrap().is_some() {
+            return Some((read(&out), read(&err)));
+        }
+        running.kill().unwrap();
+        running.wait().unwrap();
+    }
+    panic!("chromium did not end in any of {STARTS} starts: {}", read(&err));
 }
 
 /// The report with the checks, in a frame of this width.
