@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from . import plugin, worker
+from . import plugin, user_file
 
 
 def pytest_addoption(parser):
@@ -41,7 +41,7 @@ class PluginFile(pytest.File):
         before = dict(plugin.PLUGINS)
         plugin.PLUGINS.clear()
         try:
-            worker.load(str(self.path))
+            user_file.load(str(self.path))
             names = [f"{kind}.{name}" for kind, name in plugin.PLUGINS]
         finally:
             plugin.PLUGINS.clear()

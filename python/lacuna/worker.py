@@ -1,31 +1,21 @@
 """Serves the plugins of one file to the program.
 
 A message is a line of JSON, then the numbers of its matrices (doubles in little-endian order), then its bytes:
-``{"head": ..., "matrices": [[rows, columns], ...], "bytes": n}``. Requests are read from a descriptor of their own, so that
-whatever a plugin prints or reads cannot disturb them: its standard output is redirected to its standard error.
+``{"head": ..., "matrices": [[rows, columns], ...], "bytes": n}``.
 """
 
-import importlib.util
 import json
-import os
-import sys
-import traceback
 
 import numpy as np
 
-from . import plugin, serve
+from . import plugin, serve, user_file
 
 
 class Channel:
     """Messages to and from the program."""
 
     def __init__(self):
-        self.requests = os.fdopen(os.dup(0), "rb")
-        self.answers = os.fdopen(os.dup(1), "wb")
-        nothing = os.open(os.devnull, os.O_RDONLY)
-        os.dup2(nothing, 0)
-        os.close(nothing)
-        os.dup2(2, 1)
+        self.requests, self.answers = user_file.streams()
 
     def read(self):
         """The next message: its head, matrices and bytes; `None` at the end."""
@@ -67,31 +57,13 @@ class Channel:
         return matrices
 
 
-def load(path):
-    """Runs the user's file, which declares its plugins."""
-    sys.path.insert(0, os.path.dirname(path))
-    sys.argv = [path]
-    name = os.path.splitext(os.path.basename(path))[0]
-    spec = importlib.util.spec_from_file_location(name, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-
-
 def explained(error, path):
     """The error, and the last line of the user's file in its traceback."""
     if isinstance(error, SyntaxError) and error.filename == path:
         return f"{error.msg}, in line {error.lineno}"
-    said = str(error)
     if isinstance(error, serve.Wrong):
-        message = said
-    else:
-        message = type(error).__name__ + (f": {said}" if said else "")
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == path]
-    if frames:
-        line = f": `{frames[-1].line}`" if frames[-1].line else ""
-        message += f", in line {frames[-1].lineno}{line}"
-    return message
+        return f"{error}{user_file.line_of(error, path)}"
+    return user_file.explain(error, path)
 
 
 def answered(channel, objects, head, matrices, data):
@@ -127,7 +99,7 @@ def main(path):
     """Loads the file, declares its plugins, and answers until the program ends."""
     channel, objects = Channel(), {}
     try:
-        load(path)
+        user_file.load(path)
         channel.write({"plugins": [
             {"kind": kind, "name": name, "schema": plugin.schema(cls), "has": serve.SERVERS[kind].has(cls)}
             for (kind, name), cls in plugin.PLUGINS.items()

@@ -288,6 +288,35 @@ fn a_changed_file_replaces_its_plugins() {
     assert_eq!([value("curve.max()"), value("curve.min()")], [4.0, 3.0]);
 }
 
+/// A model whose gradient has a wrong sign gets a warning that names the parameter, and no trusted result.
+#[test]
+fn a_wrong_gradient_is_told() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let study = copied(folder.path());
+    quick::replace(&study, "[design]\nuse = \"latin_hypercube\"\nruns = 60\n", "");
+    quick::replace(&study, "[surrogate]\nuse = \"cubic\"\n", "");
+    let run = || {
+        let output = quick::command()
+            .args(["run", "study.toml", "--out", "run"])
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let told = "a derivative of the log density is wrong: by `rate`";
+    let sound = run();
+    assert!(!sound.contains("derivative"), "{sound}");
+    let right = "\"rate\": -inputs[\"amplitude\"]";
+    quick::replace(&folder.path().join("plugins.py"), right, "\"rate\": inputs[\"amplitude\"]");
+    let wrong = run();
+    assert!(wrong.contains(told), "{wrong}");
+    let assessment = quick::summary(&folder.path().join("run"))["assessment"].clone();
+    assert_ne!(assessment["level"], "trusted", "{assessment}");
+}
+
 /// Copies the example into a folder and shortens its chains; returns the study.
 fn copied(folder: &Path) -> PathBuf {
     for name in ["plugins.py", "study.toml", "activity.csv"] {

@@ -21,6 +21,7 @@ pub mod header;
 pub mod linear;
 pub mod memo;
 pub mod object;
+pub mod offered;
 pub mod options;
 pub mod record;
 pub mod refusal;

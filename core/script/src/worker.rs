@@ -14,7 +14,8 @@ use serde_json::{Map, Value as Json, json};
 use crate::message::{self, Message};
 
 /// The Python side: the modules of the package `lacuna` that a worker needs, as the package ships them.
-const MODULES: [(&str, &str); 3] = [
+const MODULES: [(&str, &str); 4] = [
+    ("user_file", include_str!("../../../python/lacuna/user_file.py")),
     ("plugin", include_str!("../../../python/lacuna/plugin.py")),
     ("serve", include_str!("../../../python/lacuna/serve.py")),
     ("worker", include_str!("../../../python/lacuna/worker.py")),

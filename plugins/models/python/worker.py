@@ -1,54 +1,17 @@
-"""Calls the functions of a user's file.
-
-A request is one line of JSON on standard input; an answer is one line of JSON and, after `{"count": n}`, n
-doubles in little-endian order. Both use descriptors of their own, so that whatever the user's code prints
-or reads cannot disturb them: its standard output is redirected to its standard error.
-"""
+# Calls the functions of a user's file, with `streams`, `load` and `explain` of `user_file`, whose text stands before this one.
+#
+# A request is one line of JSON on standard input; an answer is one line of JSON and, after `{"count": n}`, n doubles in
+# little-endian order.
 import array
 import collections.abc
 import contextlib
-import importlib.util
 import inspect
 import json
-import os
 import sys
-import traceback
 
 
 class Wrong(Exception):
     """A result that is not a valid response."""
-
-
-def streams():
-    requests = os.fdopen(os.dup(0), "rb")
-    answers = os.fdopen(os.dup(1), "wb")
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
-    os.dup2(2, 1)
-    return requests, answers
-
-
-def load(path):
-    sys.path.insert(0, os.path.dirname(path))
-    sys.argv = [path]
-    name = os.path.splitext(os.path.basename(path))[0]
-    spec = importlib.util.spec_from_file_location(name, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-def explain(error, path):
-    """Describes the error and the last line of the user's file in its traceback."""
-    said = str(error)
-    message = type(error).__name__ + (f": {said}" if said else "")
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == path]
-    if frames:
-        line = f": `{frames[-1].line}`" if frames[-1].line else ""
-        message += f", in line {frames[-1].lineno}{line}"
-    return message
 
 
 def grouped(names):

@@ -15,7 +15,8 @@ use super::frame::{self, Answer};
 use crate::models::given::{layout_document, scenario_document};
 use lacuna_run::process::{Printed, Process, ending};
 
-const SCRIPT: &str = include_str!("worker.py");
+const SCRIPT: &str =
+    concat!(include_str!("../../../python/lacuna/user_file.py"), include_str!("worker.py"));
 
 /// Data that do not change from call to call.
 #[derive(Debug)]

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
+use lacuna::plugin::registry::Kind;
 use lacuna::plugin::registry::loaded::AnyEntry;
-use lacuna::plugin::registry::{Built, Entry, Kind, find};
 use lacuna::plugin::{
     Design, Discrepancy, Effect, Library, Model, Quantity, Reader, Sampler, Surrogate,
 };
 use lacuna::run::Fault;
-use lacuna::text::{Complaints, Node, Problems};
+use lacuna::text::Node;
+use lacuna_abi::offered;
 use lacuna_abi::options::Options;
 use lacuna_abi::record::is_word;
 use lacuna_abi::table::{
@@ -16,9 +17,8 @@ use lacuna_abi::table::{
     ModelFunctions, QuantityFunctions, ReaderFunctions, SamplerFunctions, SurrogateFunctions,
     Table, Text, copied,
 };
-use lacuna_abi::wire::{Complaint, json_of_node, table_of_json};
-use lacuna_abi::{Object, Refusal, Reply, status, watch};
-use schemars::{Schema, SchemaGenerator};
+use lacuna_abi::wire::{json_of_node, table_of_json};
+use lacuna_abi::{Object, Refusal, Reply, watch};
 use serde_json::{Map, Value as Json};
 
 use super::Plugin;
@@ -90,13 +90,7 @@ unsafe fn offer<K: Kind + ?Sized, F: Table + Send + Sync + 'static>(
     library: &'static Library,
     adapt: fn(Plugin<F>) -> Box<K>,
 ) -> Result<AnyEntry, String> {
-    if let Ok(other) = find::<K>(name) {
-        return Err(format!(
-            "has a name that is taken: `{}` has a {} of that name too",
-            other.module_path,
-            K::NAME
-        ));
-    }
+    offered::is_free::<K>(name)?;
     // SAFETY: as the caller promises.
     let (functions, component) =
         unsafe { (copied::<F>(raw.functions.cast()), copied(raw.component)) };
@@ -104,32 +98,13 @@ unsafe fn offer<K: Kind + ?Sized, F: Table + Send + Sync + 'static>(
     let (functions, component) = (functions.map_err(said)?, component.map_err(said)?);
     let revision = revision(&component).map_err(said)?;
     let options = Options::new(schema(&component).map_err(said)?, format!("{}.{name}", K::NAME));
-    let name: &'static str = Box::leak(name.to_owned().into_boxed_str());
-    let offered: &'static Offered<K, F> = Box::leak(Box::new(Offered {
-        name,
-        functions,
-        component,
-        revision,
-        options,
-        library,
-        adapt,
-    }));
-    let path: &'static str = Box::leak(library.path.display().to_string().into_boxed_str());
-    let schema: &'static (dyn Fn(&mut SchemaGenerator) -> Schema + Send + Sync) =
-        Box::leak(Box::new(|generator: &mut SchemaGenerator| offered.options.schema(generator)));
-    let entry: &'static Entry<K> = Box::leak(Box::new(Entry {
-        name,
-        aliases: &[],
-        schema,
-        build: Box::leak(Box::new(|node: &Node, beside: &[&str], problems: &mut Problems| {
-            offered.build(node, beside, problems)
-        })),
-        module_path: path,
-        version: &library.version,
-        revision,
-        library: Some(library),
-    }));
-    Ok(entry)
+    let who = offered::who::<K>(name, library);
+    let make = Box::new(move |node: &Node| {
+        let plugin = made(node, functions, component, &who)?;
+        let options = written(&plugin, node)?;
+        Ok((adapt(plugin), options))
+    });
+    Ok(offered::entry::<K>(name, revision, options, library, make))
 }
 
 /// The revision of a plugin; 1 where it does not say.
@@ -153,67 +128,26 @@ fn schema(component: &ComponentFunctions) -> Result<Map<String, Json>, Refusal> 
     })
 }
 
-/// A plugin of a library, from which instances are made.
-struct Offered<K: ?Sized, F> {
-    name: &'static str,
+/// An instance of a plugin that messages call `who`.
+fn made<F: Table>(
+    node: &Node,
     functions: F,
     component: ComponentFunctions,
-    revision: u32,
-    options: Options,
-    library: &'static Library,
-    adapt: fn(Plugin<F>) -> Box<K>,
-}
-
-impl<K: Kind + ?Sized, F: Table> Offered<K, F> {
-    fn build(&self, node: &Node, beside: &[&str], problems: &mut Problems) -> Option<Built<K>> {
-        if !self.options.check(node, beside, problems) {
-            return None;
-        }
-        let made = self.made(node).and_then(|plugin| Ok((written(&plugin, node)?, plugin)));
-        match made {
-            Ok((options, plugin)) => {
-                let plugin = (self.adapt)(plugin);
-                let (library, revision) = (Some(self.library), self.revision);
-                Some(Built { name: self.name, plugin, options, library, revision })
-            }
-            Err(refusal) if refusal.status == status::REJECTED => {
-                let complaints = &mut Complaints::new(node, problems);
-                for complaint in Complaint::read(&refusal.message) {
-                    complaint.report(complaints);
-                }
-                None
-            }
-            Err(refusal) => {
-                let message = match refusal.status {
-                    status::PANIC => format!("`create` panicked: {}", refusal.message),
-                    _ => refusal.message,
-                };
-                problems.report(Some(node.place.clone()), format!("{}: {message}", self.who()));
-                None
-            }
-        }
+    who: &str,
+) -> Result<Plugin<F>, Refusal> {
+    let Some(create) = component.create else { return Err(Refusal::absent()) };
+    let options = json_of_node(node).to_string();
+    let mut this = std::ptr::null_mut();
+    let to = &raw mut this;
+    // SAFETY: the function belongs to a library that stays; text and place are there until it returns.
+    let call = |answer| unsafe { create(Text::of(&options), to, answer) };
+    watch::inside(who, || Reply::of("create", call))?;
+    if this.is_null() {
+        return Err(Refusal::stop("`create` makes nothing"));
     }
-
-    fn who(&self) -> String {
-        format!("{} `{}` of {}", K::NAME, self.name, self.library.file())
-    }
-
-    fn made(&self, node: &Node) -> Result<Plugin<F>, Refusal> {
-        let Some(create) = self.component.create else { return Err(Refusal::absent()) };
-        let options = json_of_node(node).to_string();
-        let mut this = std::ptr::null_mut();
-        let to = &raw mut this;
-        let who = self.who();
-        // SAFETY: the function belongs to a library that stays; text and place are there until it returns.
-        let call = |answer| unsafe { create(Text::of(&options), to, answer) };
-        watch::inside(&who, || Reply::of("create", call))?;
-        if this.is_null() {
-            return Err(Refusal::stop("`create` makes nothing"));
-        }
-        let fault = Arc::new(Fault::new(self.who()));
-        let object = Object::new(this, self.functions, self.component.destroy, fault);
-        Ok(Plugin::new(object, self.component))
-    }
+    let fault = Arc::new(Fault::new(who));
+    let object = Object::new(this, functions, component.destroy, fault);
+    Ok(Plugin::new(object, component))
 }
 
 /// All options with their defaults.

@@ -2,7 +2,7 @@
 //! none, and says nothing.
 
 use lacuna::math::moments::variance;
-use lacuna::math::random::{Stream, uniform};
+use lacuna::math::random::Stream;
 use lacuna::plugin::Target;
 use lacuna_linalg::Matrix;
 
@@ -16,8 +16,9 @@ const STEP: f64 = 1e-4;
 /// Largest difference that is no contradiction, as a part of the derivative.
 const TOLERANCE: f64 = 0.1;
 
-/// Contradiction of the gradient of a density, in words: by differences along a random direction at two draws of the prior, of two
-/// steps, so that their own error is known. `None` if nothing does, or the density cannot be evaluated there.
+/// Contradiction of the gradient of a density, in words: by differences along each coordinate at two draws of the prior, of
+/// two steps, so that their own error is known. `None` if there is none, or the density cannot be evaluated there. Each
+/// coordinate is compared by itself, because the largest derivative hides the others along any direction of all.
 pub(super) fn contradiction(
     target: &dyn Target,
     coordinates: &[Coordinate],
@@ -27,29 +28,25 @@ pub(super) fn contradiction(
     let density = target.log_density(&draws);
     let scales: Vec<f64> =
         (0..draws.columns()).map(|j| variance(&draws.column(j)).sqrt()).collect();
-    let mut rng = stream.named("direction").generator();
-    let direction: Vec<f64> =
-        scales.iter().map(|scale| if uniform(&mut rng) < 0.5 { -scale } else { *scale }).collect();
     let points: Vec<&[f64]> = (0..draws.rows())
         .filter(|&i| density[i].is_finite())
         .map(|i| draws.row(i))
         .take(POINTS)
         .collect();
-    let all = points.iter().filter_map(|point| Compared::of(target, point, &direction));
-    let all: Vec<Compared> = all.collect();
-    if all.len() < POINTS || !all.iter().all(Compared::contradicts) {
+    if points.len() < POINTS {
         return None;
     }
-    // The coordinate that shows it most.
-    let along = |j: usize| {
-        let axis: Vec<f64> =
-            (0..scales.len()).map(|i| if i == j { scales[j] } else { 0.0 }).collect();
-        Some((j, Compared::of(target, points[0], &axis)?))
+    let gradients: Vec<Vec<f64>> = points.iter().map(|point| target.gradient(point).1).collect();
+    let along = |j: usize| -> Option<(usize, Compared)> {
+        let compared = points.iter().zip(&gradients);
+        let all: Option<Vec<Compared>> = compared
+            .map(|(point, gradient)| Compared::of(target, point, gradient, (j, scales[j])))
+            .collect();
+        let all = all.filter(|all| all.iter().all(Compared::contradicts))?;
+        Some((j, all.into_iter().next()?))
     };
-    let worst = (0..scales.len())
-        .filter_map(along)
-        .filter(|(_, compared)| compared.contradicts())
-        .max_by(|a, b| a.1.gap().total_cmp(&b.1.gap()))?;
+    let worst =
+        (0..scales.len()).filter_map(along).max_by(|a, b| a.1.gap().total_cmp(&b.1.gap()))?;
     let (j, Compared { given, found, .. }) = worst;
     let name = &coordinates[j].name;
     Some(format!(
@@ -59,7 +56,7 @@ pub(super) fn contradiction(
     ))
 }
 
-/// A derivative along a direction, as it is given and as differences give it.
+/// A derivative by a coordinate per standard deviation of its prior, as it is given and as differences give it.
 struct Compared {
     given: f64,
     found: f64,
@@ -69,20 +66,26 @@ struct Compared {
 
 impl Compared {
     /// `None` where the density has no number on one of the sides.
-    fn of(target: &dyn Target, point: &[f64], direction: &[f64]) -> Option<Self> {
-        let moved = |step: f64| point.iter().zip(direction).map(move |(x, v)| x + step * v);
-        let steps = [STEP, -STEP, 0.5 * STEP, -0.5 * STEP];
-        let rows: Vec<Vec<f64>> = steps.iter().map(|step| moved(*step).collect()).collect();
+    fn of(
+        target: &dyn Target,
+        point: &[f64],
+        gradient: &[f64],
+        (j, scale): (usize, f64),
+    ) -> Option<Self> {
+        let rows = [STEP, -STEP, 0.5 * STEP, -0.5 * STEP].map(|step| {
+            let mut moved = point.to_vec();
+            moved[j] += step * scale;
+            moved
+        });
         let values = target.log_density(&Matrix::from_rows(point.len(), rows));
         if values.iter().any(|value| !value.is_finite()) {
             return None;
         }
         let wide = (values[0] - values[1]) / (2.0 * STEP);
         let found = (values[2] - values[3]) / STEP;
-        let gradient = target.gradient(point).1;
-        let given: f64 = gradient.iter().zip(direction).map(|(g, v)| g * v).sum();
         let rounding = f64::EPSILON * values.iter().fold(0.0_f64, |m, v| m.max(v.abs())) / STEP;
-        Some(Self { given, found, error: (wide - found).abs() + 100.0 * rounding })
+        let error = (wide - found).abs() + 100.0 * rounding;
+        Some(Self { given: gradient[j] * scale, found, error })
     }
 
     fn gap(&self) -> f64 {
