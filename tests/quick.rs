@@ -152,9 +152,9 @@ pub fn results(out: &Path) -> BTreeMap<String, String> {
                 continue;
             }
             let file = path.file_name().unwrap().to_string_lossy().into_owned();
-            // Checkpoints and records are not results.
-            let skipped = ["stage.json", "seconds.csv", "seconds", "progress.jsonl", "state.json"];
-            if !skipped.contains(&file.as_str()) {
+            // Checkpoints and records are not results: calls of a model are noted in the order in which they end.
+            let skipped = ["stage.json", "seconds.csv", "seconds", "state.json"];
+            if !skipped.contains(&file.as_str()) && !file.ends_with(".jsonl") {
                 found.insert(format!("{name}/{file}"), files::hash_file(&path).unwrap());
             }
         }
