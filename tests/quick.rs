@@ -154,7 +154,8 @@ pub fn results(out: &Path) -> BTreeMap<String, String> {
             let file = path.file_name().unwrap().to_string_lossy().into_owned();
             // Checkpoints and records are not results: calls of a model are noted in the order in which they end.
             let skipped = ["stage.json", "seconds.csv", "seconds", "state.json"];
-            if !skipped.contains(&file.as_str()) && !file.ends_with(".jsonl") {
+            let is_log = path.extension().is_some_and(|extension| extension == "jsonl");
+            if !skipped.contains(&file.as_str()) && !is_log {
                 found.insert(format!("{name}/{file}"), files::hash_file(&path).unwrap());
             }
         }
