@@ -139,6 +139,16 @@ fn head(bytes: &[u8]) -> Result<Option<Head>, Nothing> {
         let text = "a body of unknown length is not read: send `Content-Length`";
         return Err(Nothing::Refused(411, text.to_owned()));
     }
+    // A browser sends the origin of a page with its questions; a page that a user visits must not start the model.
+    if let Some(origin) = header("origin") {
+        let text = format!("questions of web pages are not answered; this one is of `{origin}`");
+        return Err(Nothing::Refused(403, text));
+    }
+    let lengths = request.headers.iter().filter(|h| h.name.eq_ignore_ascii_case("content-length"));
+    if lengths.count() > 1 {
+        // RFC 9112, section 6.3: which of them ends the body is not known.
+        return Err(Nothing::Refused(400, "there is more than one `Content-Length`".to_owned()));
+    }
     let length = match header("content-length") {
         None => 0,
         Some(text) => text.parse().map_err(|_| {
@@ -162,6 +172,7 @@ fn reason(status: u16) -> &'static str {
     match status {
         200 => "OK",
         400 => "Bad Request",
+        403 => "Forbidden",
         404 => "Not Found",
         405 => "Method Not Allowed",
         411 => "Length Required",

@@ -257,6 +257,22 @@ fn what_is_no_question_is_refused_without_harm() {
                 "too long",
             ),
             (
+                raw(
+                    address,
+                    b"POST /Evaluate HTTP/1.1\r\nContent-Length: 2\r\nContent-Length: 9\r\n\r\n{}",
+                ),
+                "HTTP/1.1 400",
+                "more than one `Content-Length`",
+            ),
+            (
+                raw(
+                    address,
+                    b"POST /Evaluate HTTP/1.1\r\nOrigin: http://example.org\r\nContent-Length: 2\r\n\r\n{}",
+                ),
+                "HTTP/1.1 403",
+                "questions of web pages",
+            ),
+            (
                 raw(address, b"POST /Evaluate HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n"),
                 "HTTP/1.1 411",
                 "Content-Length",
