@@ -86,6 +86,10 @@ pub struct External {
     /// limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timeout: Option<Positive>,
+    /// Largest size of what an attempt may print (`stdout.txt` and `stderr.txt` together), in MB; an attempt that prints
+    /// more is stopped and counts as failed.
+    #[serde(default = "usual_printed")]
+    pub max_printed: Positive,
     /// Conditions for a successful attempt.
     #[serde(default)]
     pub success: Success,
@@ -96,6 +100,11 @@ pub struct External {
     /// Folders of runs that are kept after the run.
     #[serde(default)]
     pub keep: Keep,
+}
+
+/// Default of `max_printed`, in MB.
+fn usual_printed() -> Positive {
+    Positive::new(100.0).unwrap_or_else(|_| unreachable!("100 is positive"))
 }
 
 /// A file made for each run.

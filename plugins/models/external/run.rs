@@ -13,7 +13,7 @@ use super::folder::{cannot, copy, link};
 use super::output::Output;
 use super::template::{Filling, Template};
 use super::{External, Input, answer, given};
-use lacuna_run::process::{self, Process, tail_of_file};
+use lacuna_run::process::{self, End, Process, tail_of_file};
 
 /// File with the standard output of the command.
 pub const STDOUT: &str = "stdout.txt";
@@ -86,7 +86,7 @@ impl External {
         }
     }
 
-    /// Runs the command to its end; fails if it exceeds the time limit.
+    /// Runs the command to its end; fails if it exceeds the time limit or the limit of what it may print.
     fn execute(&self, call: &Call<'_>, folder: &Path) -> Result<ExitStatus, EvalError> {
         let words: Vec<String> =
             self.command.iter().map(|word| fill(word, call)).collect::<Result<_, _>>()?;
@@ -114,14 +114,27 @@ impl External {
         let mut command = Command::new(&program);
         command.args(arguments).envs(variables).current_dir(folder);
         command.stdin(stdin).stdout(open(STDOUT)?).stderr(open(STDERR)?);
-        let ended = Process::start(&mut command).and_then(|mut process| {
-            process.wait(self.timeout.map(|limit| Duration::from_secs_f64(limit.get())))
-        });
-        let ended = ended.map_err(|error| cannot("run", &program, &error))?;
-        ended.ok_or_else(|| {
-            let limit = self.timeout.map_or(0.0, lacuna::text::values::Positive::get);
-            rejected(folder, format!("`{name}` was stopped after {limit} s"))
-        })
+        let most = (self.max_printed.get() * 1e6) as u64;
+        let little = || {
+            let size = |file| fs::metadata(folder.join(file)).map_or(0, |found| found.len());
+            size(STDOUT) + size(STDERR) <= most
+        };
+        let limit = self.timeout.map(|limit| Duration::from_secs_f64(limit.get()));
+        let ended =
+            Process::start(&mut command).and_then(|mut process| process.wait_while(limit, little));
+        match ended.map_err(|error| cannot("run", &program, &error))? {
+            End::Itself(status) if little() => Ok(status),
+            End::Late => {
+                let limit = limit.unwrap_or_default().as_secs_f64();
+                Err(rejected(folder, format!("`{name}` was stopped after {limit} s")))
+            }
+            End::Itself(_) | End::Stopped => {
+                let most = self.max_printed.get();
+                let text =
+                    format!("`{name}` printed more than {most} MB (`max_printed` in `[model]`)");
+                Err(rejected(folder, text))
+            }
+        }
     }
 
     /// Fails unless the run satisfies the conditions for success.

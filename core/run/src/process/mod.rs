@@ -19,6 +19,17 @@ pub use tail::{tail, tail_of_file};
 /// The time a process that was asked to end (SIGTERM) leaves to this program, to be asked as well.
 const GRACE: Duration = Duration::from_secs(3);
 
+/// How a process ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// By itself.
+    Itself(ExitStatus),
+    /// At its time limit.
+    Late,
+    /// Because it was not to go on.
+    Stopped,
+}
+
 /// A running process with all its descendants.
 #[derive(Debug)]
 pub struct Process {
@@ -50,23 +61,40 @@ impl Process {
     /// Waits until the process has ended, then ends all processes of its group that still run. Returns `None` if
     /// `limit` passes first; the whole group is then ended.
     pub fn wait(&mut self, limit: Option<Duration>) -> io::Result<Option<ExitStatus>> {
+        let end = self.wait_while(limit, || true)?;
+        Ok(match end {
+            End::Itself(status) => Some(status),
+            End::Late | End::Stopped => None,
+        })
+    }
+
+    /// Like [`Process::wait`], but ends the group also as soon as `may_go_on` returns false; it is asked again and again.
+    pub fn wait_while(
+        &mut self,
+        limit: Option<Duration>,
+        may_go_on: impl Fn() -> bool,
+    ) -> io::Result<End> {
         let begun = Instant::now();
-        let mut in_time = true;
+        let mut cut = None;
         while self.status.is_none() && !group::leader_has_ended(&mut self.child)? {
             let passed = begun.elapsed();
             if limit.is_some_and(|limit| passed >= limit) {
-                in_time = false;
+                cut = Some(End::Late);
+                break;
+            }
+            if !may_go_on() {
+                cut = Some(End::Stopped);
                 break;
             }
             thread::sleep(pause(passed));
         }
         let status = self.end()?;
-        if in_time && group::was_asked_to_end(status) {
+        if cut.is_none() && group::was_asked_to_end(status) {
             // A scheduler that ends a job signals its processes one after the other. This one may be the next: it must not
             // first report that the simulator failed, where the job reached its time limit.
             thread::sleep(GRACE);
         }
-        Ok(in_time.then_some(status))
+        Ok(cut.unwrap_or(End::Itself(status)))
     }
 
     /// Ends the process and its whole group.

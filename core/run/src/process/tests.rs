@@ -40,6 +40,16 @@ fn what_takes_too_long_is_ended_with_its_children() {
 }
 
 #[test]
+fn what_must_not_go_on_is_ended_with_its_children() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = "sleep 100 & echo $! > child; sleep 100";
+    let mut process = Process::start(&mut shell(script, folder.path())).unwrap();
+    let begun = || !folder.path().join("child").exists();
+    assert_eq!(process.wait_while(None, begun).unwrap(), End::Stopped);
+    assert!(ends(&folder.path().join("child")));
+}
+
+#[test]
 fn what_a_finished_process_left_running_is_ended() {
     let folder = tempfile::tempdir().unwrap();
     let script = "sleep 100 & echo $! > child; exit 3";

@@ -29,6 +29,17 @@ fn a_command_that_hangs_is_stopped_with_all_it_started() {
 }
 
 #[test]
+fn a_command_that_prints_without_end_is_stopped() {
+    let script = "echo begun; while :; do echo 0123456789 0123456789 0123456789; done";
+    let reason = Case::shell(script, "max_printed = 0.5").reason();
+    let expected = "`sh` printed more than 0.5 MB (`max_printed` in `[model]`); it said: 0123";
+    assert!(reason.starts_with(expected), "{reason}");
+    // What prints too much before it is looked at has failed as well.
+    let quick = Case::shell("head -c 2000000 /dev/zero", "max_printed = 1.5").reason();
+    assert!(quick.starts_with("`sh` printed more than 1.5 MB"), "{quick}");
+}
+
+#[test]
 fn exit_codes_and_signals_are_told_with_the_end_of_the_errors() {
     let script = "echo out; for i in 1 2 3 4 5 6 7; do echo \"error $i\" >&2; done; exit 3";
     let reason =
