@@ -101,7 +101,8 @@ fn failed(path: &Path, error: &str) -> Stop {
 }
 
 /// Writes the response of one run as `NAME.nc`: a variable with the response's name on the axes of the layout, with
-/// their grids as coordinate variables and their labels as attributes. Returns the file name.
+/// their grids as coordinate variables and their labels as attributes (`sensor_labels` for an axis `sensor`). Returns the
+/// file name.
 pub fn write_response(
     folder: &Path,
     run: &str,
@@ -135,9 +136,20 @@ pub fn write_response(
     Ok(file)
 }
 
+/// Attribute with the labels of an axis: separated by blanks, or as a list in JSON if a label has a blank itself.
 fn axis_labels(axis: &Axis) -> Option<(String, String)> {
     match &axis.coordinates {
-        Coordinates::Labels(labels) => Some((format!("{}_labels", axis.name), labels.join(" "))),
+        Coordinates::Labels(labels) => {
+            let one_word = |label: &String| {
+                !label.is_empty() && !label.starts_with('[') && !label.contains(char::is_whitespace)
+            };
+            let text = if labels.iter().all(one_word) {
+                labels.join(" ")
+            } else {
+                serde_json::json!(labels).to_string()
+            };
+            Some((format!("{}_labels", axis.name), text))
+        }
         Coordinates::Grid { .. } => None,
     }
 }

@@ -329,6 +329,9 @@ impl File {
                 "has neither a text variable `{name}` nor an attribute `{attribute}`"
             ))
         })?;
-        Ok(text.split_whitespace().map(str::to_owned).collect())
+        match serde_json::from_str(&text) {
+            Ok(list) => Ok(list),
+            Err(_) => Ok(text.split_whitespace().map(str::to_owned).collect()),
+        }
     }
 }
