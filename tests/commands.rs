@@ -165,6 +165,12 @@ def simulate(a, b):
     assert!(text.contains("the worker ended with exit code 1"), "{text}");
     let ran = quick::run(&study, &["simulations.allow_failed=0.5"], &out);
     assert!(ran.is_ok_and(|ran| ran.made.contains(&"4-surrogate".to_owned())));
+    // A study without a reader of its runs says so in its design.
+    replace(&study, "[simulations]\nuse = \"netcdf\"\n", "");
+    let stopped = quick::run(&study, &[], &folder.path().join("strict")).err().unwrap();
+    assert!(stopped.to_string().contains("`allow_failed` in `[design]`"), "{stopped}");
+    let ran = quick::run(&study, &["design.allow_failed=0.5"], &out);
+    assert!(ran.is_ok_and(|ran| ran.made.iter().all(|stage| stage != "2-simulate")));
 }
 
 /// Returns true if a process with this text in its command line is running.

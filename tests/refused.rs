@@ -189,3 +189,17 @@ fn a_mode_in_a_corner_stops_no_sampler() {
         }
     }
 }
+
+/// `resolved.toml` holds the folder of a study as text.
+#[cfg(unix)]
+#[test]
+fn a_folder_that_no_file_can_name_is_refused() {
+    use std::os::unix::ffi::OsStrExt as _;
+
+    let folder = quick::tables();
+    let study = fs::read_to_string(folder.path().join("study.toml")).unwrap();
+    let odd = folder.path().join(std::ffi::OsStr::from_bytes(b"a\xffb"));
+    fs::create_dir(&odd).unwrap();
+    let text = load_text(&odd.join("study.toml"), &study, &[]).complaints();
+    assert!(text.contains("the study lies in a folder whose name is not UTF-8"), "{text}");
+}

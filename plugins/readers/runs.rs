@@ -5,12 +5,9 @@ use std::path::{Path, PathBuf};
 
 use lacuna::data::{Ensemble, FailedRun, Parameter};
 use lacuna::plugin::reader::{EnsembleSource, ReadError, scenario_path};
-use lacuna::text::values::Unfit;
+use lacuna::text::values::AllowFailed;
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::de::{self, Deserializer};
-use serde::{Deserialize, Serialize};
 
 use super::sheet::{Conversion, Record, Sheet};
 
@@ -18,33 +15,6 @@ use super::sheet::{Conversion, Record, Sheet};
 const SIMULATED: &str = "runs.csv";
 /// Maximum number of failed runs named in an error.
 const NAMED: usize = 10;
-
-/// Number of runs that may be left out: a fraction if below 1, a count from 1 on.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
-#[serde(transparent)]
-pub struct AllowFailed(#[schemars(range(min = 0.0))] f64);
-
-impl AllowFailed {
-    /// Checks that a number is a fraction or a count.
-    pub fn new(number: f64) -> Result<Self, Unfit> {
-        if (0.0..1.0).contains(&number) || (number >= 1.0 && number.fract() == 0.0) {
-            Ok(Self(number))
-        } else {
-            Err(Unfit::new("a fraction from 0 to 1 or a whole number of runs", number))
-        }
-    }
-
-    /// Returns the number of runs that may be left out of `runs`.
-    pub fn of(self, runs: usize) -> usize {
-        if self.0 < 1.0 { (self.0 * runs as f64) as usize } else { self.0 as usize }
-    }
-}
-
-impl<'de> Deserialize<'de> for AllowFailed {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Self::new(f64::deserialize(deserializer)?).map_err(de::Error::custom)
-    }
-}
 
 /// Row of the table that describes one run.
 #[derive(Debug, Clone, PartialEq)]

@@ -75,6 +75,9 @@ fn a_design_grows_and_no_run_is_made_twice() {
     let before = points(&out);
     let said = printed(&mut campaign(&["extend", "--runs", "4"], &out));
     assert!(said.contains("10 runs in all") && said.contains("extended = [4]"), "{said}");
+    let status = printed(&mut campaign(&["status"], &out));
+    assert!(status.contains("2-simulate: 10 runs, 6 done, 4 missing"), "{status}");
+    assert!(status.contains("added to the design, not begun"), "{status}");
     let (code, text) = quick::said(quick::command().arg("resume").arg(&out));
     assert_eq!(code, Some(0), "{text}");
     let after = points(&out);

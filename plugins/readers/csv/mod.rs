@@ -18,10 +18,11 @@ use serde::{Deserialize, Serialize};
 
 use super::cells::LongColumns;
 use super::faults::Faults;
-use super::runs::{self, AllowFailed};
+use super::runs;
 use super::sheet::Sheet;
 use super::sierra::heartbeat;
 use super::{noise, scenario};
+use lacuna::text::values::AllowFailed;
 
 /// Reads comma-separated tables: simulation runs, measurements, and single responses.
 ///

@@ -9,7 +9,7 @@ use lacuna::plugin::Reader;
 use lacuna::plugin::reader::{EnsembleSource, GridSource, MeasurementSource};
 
 use super::Csv;
-use crate::readers::runs::AllowFailed;
+use lacuna::text::values::AllowFailed;
 
 fn layout() -> Layout {
     Layout {

@@ -16,16 +16,17 @@ use serde::{Deserialize, Serialize};
 
 use self::array::File;
 use super::noise::{self, MASK, REPLICATE, SIGMA};
-use super::runs::{self, AllowFailed, Run};
+use super::runs::{self, Run};
 use super::{scenario, sierra};
+use lacuna::text::values::AllowFailed;
 
 /// Reads netCDF files (classic, 64-bit offset, 64-bit data, netCDF-4) whose dimensions are named like the axes of the
 /// response, in any order.
 ///
 /// Each axis has a coordinate variable of its name, with numbers and their `units` or with texts; labels may instead
-/// be given by the file's attribute `sensor_labels` (for an axis `sensor`), separated by blanks. Values are converted
-/// by the attribute `units`, unpacked by `scale_factor` and `add_offset`, and missing if they equal `_FillValue` or
-/// are NaN.
+/// be given by the file's attribute `sensor_labels` (for an axis `sensor`), separated by blanks or, if they have blanks
+/// themselves, as a list in JSON (`["top left", "top right"]`). Values are converted by the attribute `units`, unpacked
+/// by `scale_factor` and `add_offset`, and missing if they equal `_FillValue` or are NaN.
 ///
 /// **Runs** (section `simulations`): either one file `path` with a further dimension `run` and a variable over it for
 /// each parameter, or a table `runs` with one file per run.

@@ -15,7 +15,7 @@ use netcdf_writer::{NcAttrValue, NcFileBuilder, NcWriteFormat, NcWriteOptions};
 
 use super::NetCdf;
 use super::array::File;
-use crate::readers::runs::AllowFailed;
+use lacuna::text::values::AllowFailed;
 
 fn unit(text: &str) -> Unit {
     Unit::parse(text).unwrap()
@@ -121,6 +121,20 @@ fn files_of_the_simulate_stage_are_read_back() {
     assert_eq!(strain.signals.columns[2].values, values[3..]);
     let head = std::fs::read(&path).unwrap();
     assert!(NetCdf::default().recognises(&path, &head));
+}
+
+/// Labels of a study may have blanks, begin with a bracket, or look like numbers.
+#[test]
+fn labels_with_blanks_come_back() {
+    for labels in [["top left", "top right"], ["[a", "b"], ["1", "2"], ["\"a\" b", "c,d"]] {
+        let folder = tempfile::tempdir().unwrap();
+        let axes = vec![Axis::labels("sensor", labels)];
+        let layout = Layout { name: "strain".into(), unit: unit("1"), axes };
+        let response = Response { values: vec![1.0, 2.0], valid: true, facts: vec![] };
+        let name = lacuna_run::write_response(folder.path(), "run-1", &layout, &response).unwrap();
+        let read = NetCdf::default().response(&folder.path().join(name), &layout);
+        assert_eq!(read.unwrap(), [1.0, 2.0], "{labels:?}");
+    }
 }
 
 #[test]

@@ -22,8 +22,9 @@ use serde::{Deserialize, Serialize};
 use self::place::{Resample, Trigger};
 use self::read::Reading;
 use self::store::{REPLICATE, Store, by_number, captured};
-use super::runs::{self, AllowFailed};
+use super::runs;
 use super::{listed, scenario};
+use lacuna::text::values::AllowFailed;
 
 /// Name by which `axes` calls the dimension of the replicates.
 const REPLICATES: &str = "replicate";

@@ -25,8 +25,9 @@ use serde::{Deserialize, Serialize};
 
 use self::probe::Probe;
 use self::signal::Output;
-use super::runs::{self, AllowFailed, Run};
+use super::runs::{self, Run};
 use super::scenario;
+use lacuna::text::values::AllowFailed;
 
 /// Reads Sierra's output of each run: Exodus II results or history files, in any netCDF container and in one file or
 /// one per processor, and heartbeat text in any of its formats.

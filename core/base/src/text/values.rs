@@ -118,6 +118,32 @@ number! {
     { "type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1 }
 }
 
+number! {
+    /// Number of runs that may be left out: a fraction if below 1, a count from 1 on.
+    AllowFailed, "a fraction from 0 to 1 or a whole number of runs",
+    |x| (0.0..1.0).contains(&x) || (x >= 1.0 && x.is_finite() && x.fract() == 0.0),
+    { "type": "number", "minimum": 0 }
+}
+
+impl AllowFailed {
+    /// Number of runs that may be left out of `runs`.
+    pub fn of(self, runs: usize) -> usize {
+        if self.0 < 1.0 { (self.0 * runs as f64) as usize } else { self.0 as usize }
+    }
+
+    /// True if no run may be left out.
+    pub fn is_none(&self) -> bool {
+        self.0 == 0.0
+    }
+}
+
+impl Default for AllowFailed {
+    /// No run may be left out.
+    fn default() -> Self {
+        Self(0.0)
+    }
+}
+
 /// A whole number of 1 or more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(transparent)]

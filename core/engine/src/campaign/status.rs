@@ -7,10 +7,13 @@ use std::path::{Path, PathBuf};
 use lacuna::plugin::Executor;
 use lacuna::plugin::executor::{Phase, Seen};
 use lacuna::run::{Stop, files};
+use lacuna_run::Stage;
 use lacuna_run::work::{Begun, Marker, Outcome, now};
 use serde::Serialize;
 
+use crate::stage::design;
 use crate::stage::simulate::{Roll, RunRecord, earlier};
+use crate::study::Study;
 
 /// Status of the runs of a run directory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -71,10 +74,14 @@ impl State {
     }
 }
 
-/// Status of a run directory; `busy` is true if a process works in it.
-pub fn status(root: &Path, executor: Option<&dyn Executor>, busy: bool) -> Result<Status, Stop> {
+/// Status of the run directory of a study; `busy` is true if a process works in it.
+pub fn status(study: &Study, root: &Path, busy: bool) -> Result<Status, Stop> {
+    let executor = study.executor.as_ref().map(|section| &*section.built.plugin);
     let mut status = Status { runs: Vec::new(), warnings: Vec::new() };
     for (stage, folder, roll) in stages(root)? {
+        let of_design = stage == Stage::Simulate.folder().name();
+        let mut added = if of_design { design::run_names(study.trained())? } else { Vec::new() };
+        added.retain(|name| !roll.runs.contains(name));
         for (scenario, own) in &roll.scenarios {
             let folder = if own.as_os_str().is_empty() { folder.clone() } else { folder.join(own) };
             let seen = executor.map_or(Ok(Vec::new()), |executor| executor.look(&folder));
@@ -93,6 +100,14 @@ pub fn status(root: &Path, executor: Option<&dyn Executor>, busy: bool) -> Resul
                 let (stage, scenario, run) = (stage.clone(), scenario.clone(), run.clone());
                 status.runs.push(Row { stage, scenario, run, state, note, seconds });
             }
+            status.runs.extend(added.iter().map(|run| Row {
+                stage: stage.clone(),
+                scenario: scenario.clone(),
+                run: run.clone(),
+                state: State::Missing,
+                note: "added to the design, not begun".to_owned(),
+                seconds: None,
+            }));
         }
     }
     status.warnings.dedup();

@@ -77,7 +77,7 @@ pub fn stage(
         }
         Ok(Design { points })
     })?;
-    let names = run_names(&section.common, &imported)?;
+    let names = names(&section.common, &imported)?;
     let brought = names.len() - section.common.total();
     let note = if brought > 0 { format!(", {brought} imported") } else { String::new() };
     observer.end(
@@ -98,8 +98,14 @@ pub fn cube(section: &Section<dyn Plugin, DesignKeys>, study: &Study) -> Result<
     Ok(cube)
 }
 
+/// Names of all runs that the study's design asks for; empty without one.
+pub fn run_names(study: &Study) -> Result<Vec<String>, Stop> {
+    let Some(section) = &study.design else { return Ok(Vec::new()) };
+    names(&section.common, &imports::read(study)?)
+}
+
 /// Names of all runs; those of the initial runs do not change when others are added.
-fn run_names(keys: &DesignKeys, imported: &[Imported]) -> Result<Vec<String>, Stop> {
+fn names(keys: &DesignKeys, imported: &[Imported]) -> Result<Vec<String>, Stop> {
     let mut names = super::simulate::names(keys.runs.get());
     let digits = names.last().map_or(0, |last| last.len() - "run".len());
     names.extend((names.len() + 1..=keys.total()).map(|i| format!("run{i:0digits$}")));

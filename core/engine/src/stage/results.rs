@@ -20,8 +20,8 @@ pub fn ensemble(source: &EnsembleSource<'_>, allowed: usize) -> Result<Ensemble,
     let folder = source.simulated.map(|folder| folder.display().to_string());
     Err(Stop::new(message)
         .saved(format!("the other runs in {}", folder.unwrap_or_default()))
-        .help("`lacuna campaign status RUN` shows why each failed, `lacuna campaign retry RUN` repeats them; or \
-               name a reader in `[simulations]` and set there how many may fail (`allow_failed`)"))
+        .help("`lacuna campaign status RUN` shows why each failed, `lacuna campaign retry RUN` repeats them; \
+               `allow_failed` in `[design]` (in a study with `[simulations]` there) sets how many may fail"))
 }
 
 /// Like [`ensemble`], including failed runs, however many.

@@ -215,8 +215,10 @@ pub fn grown(
 
 /// Returns true if the data cannot be read after any run has failed.
 fn none_may_fail(study: &Study, runs: usize) -> bool {
-    let reader = study.simulations.as_ref().map(|section| &section.built.plugin);
-    reader.map_or(Some(0), |reader| reader.allowed_failures(runs)) == Some(0)
+    match &study.simulations {
+        Some(section) => section.built.plugin.allowed_failures(runs) == Some(0),
+        None => study.design.as_ref().is_none_or(|d| d.common.allow_failed.of(runs) == 0),
+    }
 }
 
 fn summary(simulated: &Simulated) -> String {
@@ -359,7 +361,8 @@ fn first_failed(run: &str, reason: &str) -> Stop {
     Stop::new(format!(
         "the first run, `{run}`, failed, and no run may fail, so the others are not made: {reason}"
     ))
-    .help("fix the cause and run the same command again; `allow_failed` in `[simulations]` sets how many runs may fail")
+    .help("fix the cause and run the same command again; `allow_failed` in `[design]` (in a study with `[simulations]` there) \
+           sets how many runs may fail")
 }
 
 /// Names `run001`, `run002`, …, with as many digits as the last one needs.

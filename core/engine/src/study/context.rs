@@ -37,6 +37,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
         return;
     }
     let mut complaints = Complaints::new(root, problems);
+    folder(study, &mut complaints);
     if study.target.is_some() {
         beside_a_target(study, root, &mut complaints);
     } else {
@@ -75,6 +76,20 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     each_plugin(study, root, problems, |_, component, context, complaints| {
         component.check(context, complaints);
     });
+}
+
+/// Reports a folder that `resolved.toml` cannot name: TOML is UTF-8, and without the folder a run is not resumed.
+fn folder(study: &Study, complaints: &mut Complaints<'_>) {
+    let folder = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
+    if folder.to_str().is_none() {
+        complaints
+            .at("")
+            .say("the study lies in a folder whose name is not UTF-8")
+            .expected(
+                "a folder that a TOML file can name, so that a run of the study can be resumed",
+            )
+            .found(folder.display());
+    }
 }
 
 /// Reports sections that have no use beside `[target]`, which replaces everything that makes up a likelihood.
@@ -162,6 +177,13 @@ fn runs_to_learn_from(study: &Study, complaints: &mut Complaints<'_>) {
         complaints.at("").say("the study has no simulation runs").expected(
             "`[model]` and `[design]`, or `[simulations]` with the files of finished runs",
         );
+    }
+    let allowed = study.design.as_ref().is_some_and(|d| !d.common.allow_failed.is_none());
+    if allowed && study.simulations.is_some() {
+        complaints
+            .at("design.allow_failed")
+            .say("the study has a reader of its runs, which says how many may fail")
+            .expected("`allow_failed` in `[simulations]`");
     }
     if study.numerical_error.is_some() && (!simulated || imported) {
         complaints

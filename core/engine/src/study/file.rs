@@ -12,7 +12,7 @@ use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::effect::On;
 use lacuna::text::file_name::FileName;
-use lacuna::text::values::{Count, Name, Positive};
+use lacuna::text::values::{AllowFailed, Count, Name, Positive};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -142,6 +142,10 @@ pub struct DesignKeys {
     /// that edge outside the prior. The model must give results there. Default: no margin.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin: Option<Positive>,
+    /// Number of runs that may fail: a fraction if below 1, a count from 1 on. They are left out of the training; more of
+    /// them stop the study. A study with `[simulations]` says so there.
+    #[serde(default, skip_serializing_if = "AllowFailed::is_none")]
+    pub allow_failed: AllowFailed,
 }
 
 impl DesignKeys {

@@ -15,7 +15,7 @@ use super::super::probe::Probe;
 use super::super::signal::Signal;
 use super::super::write::{History, Origin, write_history};
 use super::{base, largest_difference, reference, sample};
-use crate::readers::runs::AllowFailed;
+use lacuna::text::values::AllowFailed;
 
 const GAUGES: [&str; 10] = ["B", "C", "G", "M", "R", "T", "U", "V", "Y", "Z"];
 

@@ -63,7 +63,10 @@ pub fn ensemble_through(
             Ok(reader.ensemble(source)?)
         }
         _ => {
-            let allowed = reader.and_then(|reader| reader.allowed_failures(made));
+            let allowed = match (reader, &study.design) {
+                (Some(reader), _) => reader.allowed_failures(made),
+                (None, design) => design.as_ref().map(|d| d.common.allow_failed.of(made)),
+            };
             results::ensemble(source, allowed.unwrap_or(0))
         }
     })
