@@ -9,9 +9,9 @@ use lacuna_engine::campaign;
 use lacuna_engine::study::resolve::Use;
 use lacuna_run::RunDirectory;
 
-use crate::progress::Terminal;
+use crate::interrupt::{self, Next};
 use crate::study::kept_study_for;
-use crate::{misuse, print};
+use crate::{misuse, print, progress};
 
 /// Operation on the runs.
 #[derive(clap::Subcommand)]
@@ -75,8 +75,7 @@ pub fn campaign(what: &Campaign) -> anyhow::Result<()> {
 
 fn status(folder: &Path, all: bool, json: bool) -> anyhow::Result<()> {
     let study = kept_study_for(folder, Use::Look)?;
-    let executor = study.executor.as_ref().map(|section| &*section.built.plugin);
-    let status = campaign::status(folder, executor, RunDirectory::is_busy(folder))?;
+    let status = campaign::status(&study, folder, RunDirectory::is_busy(folder))?;
     if json {
         let text = serde_json::to_string_pretty(&status)
             .map_err(|error| Stop::new(format!("the table cannot be written: {error}")))?;
@@ -90,7 +89,8 @@ fn status(folder: &Path, all: bool, json: bool) -> anyhow::Result<()> {
 fn retry(folder: &Path) -> anyhow::Result<()> {
     let study = kept_study_for(folder, Use::Run)?;
     let mut run = RunDirectory::open(folder)?;
-    let failed = campaign::retry(&study, &mut run, &Terminal::new())?;
+    interrupt::explain(folder, Next::Again);
+    let failed = campaign::retry(&study, &mut run, &*progress::observer())?;
     if failed > 0 {
         let plural = if failed == 1 { "run has" } else { "runs have" };
         let stop = Stop::new(format!("{failed} {plural} failed again"));

@@ -7,9 +7,9 @@ use lacuna_engine::coverage::{self, Asked, COUNT, QUICK};
 use lacuna_engine::report::coverage_text;
 use lacuna_run::{RunDirectory, Stage};
 
-use crate::print;
-use crate::progress::Terminal;
+use crate::interrupt::{self, Next};
 use crate::study::{Settings, folder, load};
+use crate::{print, progress};
 
 /// Options of the count.
 #[derive(clap::Args)]
@@ -50,6 +50,7 @@ pub fn coverage(
     let study = load(path, settings)?;
     let root = folder(&study, out);
     let mut run = RunDirectory::open(&root)?;
+    interrupt::explain(&root, Next::Again);
     let usual = if manner.quick { QUICK } else { COUNT };
     let asked = Asked {
         count: manner.count.map_or(usual, std::num::NonZeroUsize::get),
@@ -61,7 +62,7 @@ pub fn coverage(
         }),
         from_runs: manner.from_runs,
     };
-    let found = coverage::coverage(&study, &asked, &mut run, &Terminal::new())?;
+    let found = coverage::coverage(&study, &asked, &mut run, &*progress::observer())?;
     print("");
     print(coverage_text(&found).trim_end());
     print("");

@@ -13,9 +13,9 @@ use lacuna_engine::report::findings::{Findings, GapFindings};
 use lacuna_engine::report::{gap_text, next_text, power_text};
 use lacuna_run::RunDirectory;
 
-use crate::progress::Terminal;
-use crate::study::{Settings, Trust, folder, load, print_summary};
-use crate::{misuse, print};
+use crate::interrupt::{self, Next};
+use crate::study::{Settings, Trust, folder, load, print_summary, report_of};
+use crate::{misuse, print, progress};
 
 /// Treatment of the effects that were found.
 #[derive(clap::Args)]
@@ -43,9 +43,9 @@ pub fn gap(
     let study = load(path, settings)?;
     let root = folder(&study, out);
     let mut run = RunDirectory::open(&root)?;
-    let terminal = Terminal::new();
-    let findings = pipeline::find_gap(&study, &mut run, &terminal)?;
-    let report = |root: &Path| print(&format!("report: {}", root.join("report.html").display()));
+    interrupt::explain(&root, Next::Again);
+    let observer = progress::observer();
+    let findings = pipeline::find_gap(&study, &mut run, &*observer)?;
     let gap = found(&findings)?;
     print("");
     print(&format!("before anything is added: {}", findings.assessment.line()));
@@ -54,24 +54,24 @@ pub fn gap(
     print("");
     let wanted = wanted(&gap.result, manner)?;
     if wanted.additions.is_empty() {
-        report(&root);
+        report_of(&root);
         return trust.demand(&findings.assessment);
     }
     let gap = GapFindings { result: wanted, ..gap.clone() };
     let set = settings.set();
     let begun =
         Begun { study: &study, path, folder: out, settings: &set, findings: &findings, gap: &gap };
-    let (added, with) = add(&begun, &run, &terminal)?;
+    let (added, with) = add(&begun, &run, &*observer)?;
     // The gap stage is repeated because the report of the study shows whether the added effects helped.
-    let findings = pipeline::find_gap(&study, &mut run, &terminal)?;
+    let findings = pipeline::find_gap(&study, &mut run, &*observer)?;
     print("");
     print_summary(&with);
     print("");
     print(gap_text(&findings).trim_end());
     print("");
     print(&format!("study with the added effects: {}", added.study.display()));
-    report(&added.run);
-    report(&root);
+    report_of(&added.run);
+    report_of(&root);
     trust.demand(&with.assessment)
 }
 
@@ -83,10 +83,12 @@ pub fn power(
     quick: bool,
 ) -> anyhow::Result<()> {
     let study = load(path, settings)?;
-    let mut run = RunDirectory::open(&folder(&study, out))?;
+    let root = folder(&study, out);
+    let mut run = RunDirectory::open(&root)?;
+    interrupt::explain(&root, Next::Again);
     let (design, simulations) =
         if quick { (PowerDesign::quick(), Some(QUICK)) } else { (PowerDesign::thorough(), None) };
-    let rates = pipeline::power(&study, &design, simulations, &mut run, &Terminal::new())?;
+    let rates = pipeline::power(&study, &design, simulations, &mut run, &*progress::observer())?;
     print("");
     print(power_text(&rates).trim_end());
     Ok(())
@@ -121,8 +123,10 @@ pub fn next(
     by: Option<By>,
 ) -> anyhow::Result<()> {
     let study = load(path, settings)?;
-    let mut run = RunDirectory::open(&folder(&study, out))?;
-    let findings = pipeline::find_gap(&study, &mut run, &Terminal::new())?;
+    let root = folder(&study, out);
+    let mut run = RunDirectory::open(&root)?;
+    interrupt::explain(&root, Next::Again);
+    let findings = pipeline::find_gap(&study, &mut run, &*progress::observer())?;
     found(&findings)?;
     let stop = || Stop::new("the information of further data has no finite value");
     let text = next_text(&findings, by.map(By::wanted)).ok_or_else(stop)??;

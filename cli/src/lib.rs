@@ -3,8 +3,10 @@
 mod campaign;
 mod convert;
 mod coverage;
+mod events;
 mod gap;
 mod inspect;
+mod interrupt;
 mod manual;
 mod new;
 mod plugins;
@@ -37,6 +39,9 @@ struct Arguments {
     /// Number of threads (default: all cores); affects the run time, not the results
     #[arg(long, global = true, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
+    /// For programs: print JSON, one event a line (stages, progress, warnings, results, the end with its exit code)
+    #[arg(long, global = true)]
+    events: bool,
 }
 
 #[derive(Subcommand)]
@@ -233,7 +238,34 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         // Only this line ever builds the pool, so it cannot fail because a pool already exists.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global();
     }
-    let result = match arguments.verb {
+    if arguments.events {
+        events::turn_on();
+    }
+    let code = match perform(arguments.verb) {
+        Ok(()) if terminal::has_failed() => {
+            terminal::tell("error: standard output could not be written in full");
+            1
+        }
+        Ok(()) => 0,
+        Err(error) => {
+            let (text, code) = told(&error);
+            let text = text.trim_end();
+            if arguments.events {
+                events::end(code, Some(text));
+            }
+            terminal::tell(text);
+            return code;
+        }
+    };
+    if arguments.events {
+        events::end(code, None);
+    }
+    code
+}
+
+/// Executes a command.
+fn perform(verb: Verb) -> anyhow::Result<()> {
+    match verb {
         Verb::Run { study, settings, out, trust } => {
             study::run(&study, &settings, out.as_deref(), trust)
         }
@@ -269,18 +301,6 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::New { what } => new::write(&what),
         Verb::Completions { shell } => manual::completions(shell),
         Verb::Man => manual::page(),
-    };
-    match result {
-        Ok(()) if terminal::has_failed() => {
-            terminal::tell("error: standard output could not be written in full");
-            1
-        }
-        Ok(()) => 0,
-        Err(error) => {
-            let (text, code) = told(&error);
-            terminal::tell(text.trim_end());
-            code
-        }
     }
 }
 

@@ -7,13 +7,19 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use lacuna::run::Observer;
 
+use crate::events::{self, Events};
 use crate::terminal::{clean, tell};
 
 /// Interval between plain lines.
 const INTERVAL: Duration = Duration::from_secs(10);
 
+/// Where a command tells its progress: the terminal, or events for programs.
+pub fn observer() -> Box<dyn Observer> {
+    if events::are_on() { Box::new(Events::default()) } else { Box::new(Terminal::new()) }
+}
+
 /// Shows the progress of a run on standard error.
-pub struct Terminal {
+struct Terminal {
     interactive: bool,
     current: Mutex<Option<Current>>,
 }
@@ -31,7 +37,7 @@ struct Current {
 
 impl Terminal {
     /// A display that shows nothing yet.
-    pub fn new() -> Self {
+    fn new() -> Self {
         let interactive = std::io::stderr().is_terminal();
         Self { interactive, current: Mutex::new(None) }
     }

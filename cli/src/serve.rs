@@ -10,9 +10,8 @@ use lacuna_engine::study::resolve::Use;
 use lacuna_um_bridge::protocol::{Config, Fault, INTERNAL_ERROR, INVALID_INPUT, Support};
 use lacuna_um_bridge::{Model, Server};
 
-use crate::print;
-use crate::progress::Terminal;
 use crate::study::{Settings, folder, load, load_for};
+use crate::{interrupt, print, progress};
 
 /// Address at which the server listens.
 #[derive(clap::Args)]
@@ -54,9 +53,9 @@ pub fn serve(
         print(&format!("no finished run in {directory}: the model alone is served"));
     }
     let stopper = server.stopper();
-    ctrlc::set_handler(move || stopper.stop())
+    interrupt::when_asked(move |_| stopper.stop())
         .map_err(|error| Stop::new(format!("cannot wait for Ctrl-C: {error}")))?;
-    let answered = functions(&study, run, &Terminal::new(), |functions| {
+    let answered = functions(&study, run, &*progress::observer(), |functions| {
         for function in functions {
             print(&described(*function));
         }

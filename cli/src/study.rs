@@ -15,10 +15,10 @@ use lacuna_engine::study::resolve::{self, Use};
 use lacuna_engine::study::{Checked, Study};
 use lacuna_run::RunDirectory;
 
+use crate::interrupt::{self, Next};
 use crate::plugins::Libraries;
-use crate::progress::Terminal;
 use crate::terminal::{clean, print_styled, tell};
-use crate::{Untrusted, misuse, plugins, print};
+use crate::{Untrusted, events, misuse, plugins, print, progress};
 
 /// Keys set on the command line.
 #[derive(Default, clap::Args)]
@@ -226,11 +226,23 @@ fn is_finished(folder: &Path) -> bool {
     folder.join("manifest.json").exists()
 }
 
+/// Tells where the report of a run is.
+pub fn report_of(folder: &Path) {
+    if events::are_on() {
+        return events::result(folder);
+    }
+    print(&format!("report: {}", folder.join("report.html").display()));
+}
+
 /// Prints the closing summary; on a colour terminal its first line has the colour of the verdict.
 pub fn print_summary(findings: &Findings) {
     let text = summary_text(findings);
     let (first, rest) = text.trim_end().split_once('\n').unwrap_or((text.trim_end(), ""));
-    print_styled(&coloured(&clean(first), findings.assessment.level));
+    if events::are_on() {
+        print(first);
+    } else {
+        print_styled(&coloured(&clean(first), findings.assessment.level));
+    }
     print(rest);
 }
 
@@ -250,14 +262,15 @@ fn coloured(line: &str, level: Level) -> String {
 /// Runs all stages; with `look`, results are reused whatever version made them.
 fn execute(study: &Study, folder: &Path, look: bool, trust: Trust) -> anyhow::Result<()> {
     let mut run = RunDirectory::open(folder)?;
+    interrupt::explain(folder, Next::Resume);
     if look {
         if study.libraries.absent.is_empty() { run.look() } else { run.look_as_recorded() }
     }
-    let terminal = Terminal::new();
-    let findings = pipeline::run(study, &mut run, &terminal)?;
+    let observer = progress::observer();
+    let findings = pipeline::run(study, &mut run, &*observer)?;
     print("");
     print_summary(&findings);
     print("");
-    print(&format!("report: {}", folder.join("report.html").display()));
+    report_of(folder);
     trust.demand(&findings.assessment)
 }

@@ -4,18 +4,25 @@
 use std::io::{ErrorKind, Write as _};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::events;
+
 /// True once standard output could not be written for another reason than a closed pipe.
 static FAILED: AtomicBool = AtomicBool::new(false);
 
 /// Prints a line to standard output.
 pub fn print(text: &str) {
-    print_styled(&clean(text));
+    if events::are_on() { events::text(text) } else { print_styled(&clean(text)) }
 }
 
 /// Prints a line that has escape sequences of its own.
 pub fn print_styled(text: &str) {
     let mut out = std::io::stdout().lock();
-    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+    note(writeln!(out, "{text}").and_then(|()| out.flush()));
+}
+
+/// Remembers that standard output did not take all.
+pub fn note(written: std::io::Result<()>) {
+    match written {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             FAILED.store(true, Ordering::Relaxed);
         }
