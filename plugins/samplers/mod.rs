@@ -20,6 +20,7 @@ mod population;
 mod proposal;
 pub mod sequential_monte_carlo;
 mod snooker;
+pub mod transport;
 #[cfg(test)]
 mod truth;
 pub mod variational;

@@ -1,6 +1,6 @@
 //! `no_u_turn`: chains whose trajectories end at a U-turn.
 
-mod tree;
+pub(crate) mod tree;
 
 use lacuna::data::Statistic;
 use lacuna::math::random::Stream;

@@ -108,7 +108,7 @@ impl<R: Rng> Builder<'_, '_, R> {
 
 /// Makes one step of a chain: a trajectory of at most `2^depth - 1` leapfrog steps of size `step`, and a draw from
 /// its points.
-pub(super) fn transition(
+pub(crate) fn transition(
     flow: &Flow<'_>,
     from: &Point,
     step: f64,
