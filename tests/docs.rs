@@ -8,6 +8,7 @@ mod book;
 mod effects;
 pub mod markdown;
 mod summary;
+mod translated;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -146,6 +146,15 @@ fn the_tutorial_goes_as_it_says() {
 }
 
 #[test]
-fn finished_runs_are_inspected_as_the_guide_says() {
-    Walk::guide("docs/my_runs.md").follow("Files");
+fn the_guide_to_finished_runs_goes_as_it_says() {
+    let mut walk = Walk::guide("docs/my_runs.md");
+    walk.follow("Files");
+    walk.follow("The study");
+}
+
+#[test]
+fn the_citation_has_the_version_of_the_program() {
+    let citation = fs::read_to_string(root().join("CITATION.cff")).unwrap();
+    let version = concat!("version: ", env!("CARGO_PKG_VERSION"));
+    assert!(citation.lines().any(|line| line == version), "CITATION.cff lacks `{version}`");
 }
