@@ -4,9 +4,11 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod book;
 mod effects;
 pub mod markdown;
 mod summary;
+mod translated;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

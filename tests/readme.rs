@@ -1,4 +1,4 @@
-//! Follows the READMEs of examples as a newcomer would: in a copy of the folder, command by command.
+//! Follows the READMEs of examples and guides as a newcomer would: in a copy of the folder, command by command.
 //!
 //! A block `sh` is executed line by line. A block `text` after it is the expected output of its last command, with `…`
 //! for anything that differs from machine to machine; if it begins with `error` the command must end with code 1, which
@@ -52,13 +52,22 @@ impl Walk {
             copy(&quick::root().join(folder), &to.path().join(folder));
         }
         let page = to.path().join(folders[0]).join("README.md");
+        Self::at(to, page, place)
+    }
+
+    /// Follows a guide in an empty folder; its path is relative to the root of the project.
+    pub fn guide(page: &str) -> Self {
+        Self::at(tempfile::tempdir().unwrap(), quick::root().join(page), "")
+    }
+
+    fn at(copy: TempDir, page: PathBuf, place: &str) -> Self {
         let lacuna = PathBuf::from(quick::command().get_program());
         let mut programs = vec![lacuna.parent().unwrap().to_owned()];
         if let Some(python) = std::env::var_os("LACUNA_PYTHON") {
             programs.push(Path::new(&python).parent().unwrap().to_owned());
         }
         let (variables, started) = (Vec::new(), Vec::new());
-        Self { copy: to, page, place: place.into(), programs, variables, started }
+        Self { copy, page, place: place.into(), programs, variables, started }
     }
 
     /// A path as the commands see it.
