@@ -3,6 +3,7 @@
 use std::fs;
 
 use lacuna_engine::assess::{Level, Severity};
+use lacuna_engine::stage::contents;
 
 use super::{assess, change, findings, found, oscillator, stop};
 use crate::quick;
@@ -27,6 +28,9 @@ fn one_wrong_number_in_the_table_of_parameters_stops_the_run_with_its_line() {
                     `frequency` is 19.06489, and its design reaches from 1.5 to 2.5";
     assert!(text.starts_with(expected), "{text}");
     assert!(text.contains("outside_design = \"allow\""));
+    // A check says the same before anything is run.
+    let study = quick::load(&folder.path().join("study.toml"), &[]);
+    assert_eq!(contents::check(&study)[0].to_string(), text);
     let assessment = assess(folder.path(), &["simulations.outside_design=\"allow\""]);
     found(&assessment, "runs_outside_design", Severity::Reservation);
     // Inside the design the response reveals it.

@@ -41,7 +41,7 @@ fn the_neck_of_a_funnel_is_visited() {
     assert!((deep as f64) < 0.005 * draws.len() as f64, "{deep} of {}", draws.len());
 }
 
-/// Where nothing is bent, the map has no terms for it.
+/// A map has no terms for what is not bent.
 #[test]
 fn a_normal_density_needs_no_curved_map() {
     let sampler = Transport::default();

@@ -108,6 +108,10 @@ fn simulations(study: &Study) -> Vec<Stop> {
     };
     match ensemble {
         Err(stops) => stops,
-        Ok(ensemble) => surrogate::Fitting::of(study, &ensemble).err().into_iter().collect(),
+        Ok(ensemble) => {
+            let inside = read::outside::refuse(study, &ensemble);
+            let fits = inside.and_then(|()| surrogate::Fitting::of(study, &ensemble).map(drop));
+            fits.err().into_iter().collect()
+        }
     }
 }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::math::moments::log_sum;
 use crate::math::random::{Stream, normal, uniform};
 use crate::math::special::HALF_LN_TWO_PI;
+use crate::matrix::Matrix;
 
 /// A mixture of normal distributions in several dimensions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -68,7 +69,9 @@ impl Mixture {
 
     /// Mean log density of draws.
     pub fn mean_log_density(&self, draws: &[Vec<f64>]) -> f64 {
-        draws.iter().map(|z| self.log_density(z)).sum::<f64>() / draws.len() as f64
+        let mut logs = Logs::of(self);
+        let log_density = |z: &Vec<f64>| log_sum(logs.at(z).iter().copied());
+        draws.iter().map(log_density).sum::<f64>() / draws.len() as f64
     }
 
     /// Log density at a point.
@@ -77,7 +80,7 @@ impl Mixture {
     }
 
     fn logs(&self, z: &[f64]) -> Vec<f64> {
-        self.components.iter().map(|c| c.weight.ln() + c.log_density(z)).collect()
+        Logs::of(self).at(z).to_vec()
     }
 
     /// Derivatives of the log density.
@@ -116,13 +119,14 @@ impl Mixture {
         let mut mixture = Self::start(draws, count, stream)?;
         let mut before = f64::NEG_INFINITY;
         for _ in 0..STEPS {
-            let mut shares: Vec<Vec<f64>> = Vec::with_capacity(draws.len());
+            let mut logs = Logs::of(&mixture);
+            let mut shares = Matrix::zeros(0, mixture.count());
             let mut value = 0.0;
             for z in draws {
-                let logs = mixture.logs(z);
+                let logs = logs.at(z);
                 let whole = log_sum(logs.iter().copied());
                 value += whole;
-                shares.push(logs.iter().map(|log| (log - whole).exp()).collect());
+                shares.extend_row(logs.iter().map(|log| (log - whole).exp()));
             }
             value /= draws.len() as f64;
             if !value.is_finite() {
@@ -158,29 +162,29 @@ impl Mixture {
             });
             centres.push(&draws[chosen.unwrap_or(0)]);
         }
-        let share = |z: &Vec<f64>| {
+        let mut shares = Matrix::zeros(0, count);
+        for z in draws {
             let near = centres.iter().map(|c| distance(z, c));
             let nearest = near.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(k, _)| k);
-            (0..count).map(|k| f64::from(u8::from(k == nearest))).collect()
-        };
-        let shares: Vec<Vec<f64>> = draws.iter().map(share).collect();
+            shares.extend_row((0..count).map(|k| f64::from(u8::from(k == nearest))));
+        }
         Self::maximised(draws, &shares)
     }
 
-    fn maximised(draws: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<Self> {
+    fn maximised(draws: &[Vec<f64>], shares: &Matrix) -> Option<Self> {
         let d = draws[0].len();
         let component = |k: usize| {
-            let sum: f64 = shares.iter().map(|share| share[k]).sum();
+            let sum: f64 = shares.iter_rows().map(|share| share[k]).sum();
             // A component with fewer draws than it has directions is dropped.
             if sum < (d + 1) as f64 {
                 return None;
             }
             let mut mean = vec![0.0; d];
-            for (z, share) in draws.iter().zip(shares) {
+            for (z, share) in draws.iter().zip(shares.iter_rows()) {
                 mean.iter_mut().zip(z).for_each(|(m, z)| *m += share[k] * z / sum);
             }
             let mut covariance = vec![vec![0.0; d]; d];
-            for (z, share) in draws.iter().zip(shares) {
+            for (z, share) in draws.iter().zip(shares.iter_rows()) {
                 for i in 0..d {
                     let scaled = share[k] * (z[i] - mean[i]) / sum;
                     for j in 0..=i {
@@ -192,7 +196,7 @@ impl Mixture {
             let factor = cholesky(&covariance)?;
             Some(Component { weight: sum / draws.len() as f64, mean, factor })
         };
-        let mut components: Vec<Component> = (0..shares[0].len()).filter_map(component).collect();
+        let mut components: Vec<Component> = (0..shares.columns()).filter_map(component).collect();
         let sum: f64 = components.iter().map(|c| c.weight).sum();
         for component in &mut components {
             component.weight /= sum;
@@ -201,20 +205,55 @@ impl Mixture {
     }
 }
 
+/// Logarithms of the weighted densities of the components, at many points.
+struct Logs<'a> {
+    mixture: &'a Mixture,
+    /// Logarithms of weight and of the factor's determinant, by component.
+    constants: Vec<(f64, f64)>,
+    white: Vec<f64>,
+    logs: Vec<f64>,
+}
+
+impl<'a> Logs<'a> {
+    fn of(mixture: &'a Mixture) -> Self {
+        let constants = |c: &Component| {
+            let log_factor: f64 = c.factor.iter().enumerate().map(|(i, row)| row[i].ln()).sum();
+            (c.weight.ln(), log_factor)
+        };
+        Self {
+            mixture,
+            constants: mixture.components.iter().map(constants).collect(),
+            white: Vec::new(),
+            logs: Vec::new(),
+        }
+    }
+
+    fn at(&mut self, z: &[f64]) -> &[f64] {
+        let Self { mixture, constants, white, logs } = self;
+        logs.clear();
+        for (component, (log_weight, log_factor)) in mixture.components.iter().zip(constants) {
+            component.whiten(z, white);
+            let square: f64 = white.iter().map(|w| w * w).sum();
+            let log_density = -0.5 * square - *log_factor - z.len() as f64 * HALF_LN_TWO_PI;
+            logs.push(*log_weight + log_density);
+        }
+        logs
+    }
+}
+
 impl Component {
     fn white(&self, z: &[f64]) -> Vec<f64> {
-        let mut x: Vec<f64> = Vec::with_capacity(z.len());
-        for (i, row) in self.factor.iter().enumerate() {
-            let before: f64 = row.iter().zip(&x).map(|(a, b)| a * b).sum();
-            x.push((z[i] - self.mean[i] - before) / row[i]);
-        }
+        let mut x = Vec::new();
+        self.whiten(z, &mut x);
         x
     }
 
-    fn log_density(&self, z: &[f64]) -> f64 {
-        let square: f64 = self.white(z).iter().map(|w| w * w).sum();
-        let log_factor: f64 = self.factor.iter().enumerate().map(|(i, row)| row[i].ln()).sum();
-        -0.5 * square - log_factor - z.len() as f64 * HALF_LN_TWO_PI
+    fn whiten(&self, z: &[f64], x: &mut Vec<f64>) {
+        x.clear();
+        for (i, row) in self.factor.iter().enumerate() {
+            let before: f64 = row.iter().zip(&*x).map(|(a, b)| a * b).sum();
+            x.push((z[i] - self.mean[i] - before) / row[i]);
+        }
     }
 
     fn slopes(&self, z: &[f64]) -> Vec<f64> {

@@ -71,7 +71,7 @@ fn last_digit(values: &[f64]) -> f64 {
 }
 
 /// Returns an error for runs outside the declared design, unless the study permits them.
-pub(super) fn refuse(study: &Study, ensemble: &Ensemble) -> Result<(), Stop> {
+pub(in crate::stage) fn refuse(study: &Study, ensemble: &Ensemble) -> Result<(), Stop> {
     let keys = study.simulations.as_ref().map(|section| section.common.outside_design);
     if keys == Some(OutsideDesign::Allow) {
         return Ok(());
