@@ -52,11 +52,13 @@ impl<S: Read + Write> Reader<S> {
     /// Waits for the next request; `stop` returns true if waiting should end.
     pub(super) fn next(&mut self, stop: impl Fn() -> bool) -> Result<Request, Nothing> {
         let head = loop {
-            if let Some(head) = head(&self.buffer, self.longest)? {
-                break head;
-            }
-            if self.buffer.len() > LONGEST_HEAD {
+            let found = head(&self.buffer, self.longest)?;
+            let length = found.as_ref().map_or(self.buffer.len(), |head| head.end);
+            if length > LONGEST_HEAD {
                 return Err(Nothing::Refused(431, "the head of the request is too long".into()));
+            }
+            if let Some(head) = found {
+                break head;
             }
             let idle = self.buffer.is_empty();
             let patience = if idle { IDLE } else { PATIENCE };

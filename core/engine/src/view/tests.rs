@@ -10,9 +10,10 @@ use lacuna::diagnose::chains;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna_linalg::Matrix;
+use lacuna_run::RunDirectory;
 use serde_json::json;
 
-use super::{Answer, RunState, ServedFolder, Watched};
+use super::{Answer, GapState, RunState, ServedFolder, Watched};
 use crate::posterior::CoordinateScale;
 use crate::stage::calibrate::{Outline, OutlinedCoordinate};
 
@@ -111,7 +112,9 @@ fn chains_are_diagnosed_while_they_are_written() {
         assert!(close(found.mean, pooled.iter().sum::<f64>() / pooled.len() as f64), "{found:?}");
     }
     // One chain is three standard deviations away from the others.
-    assert!(sampling.coordinates[0].r_hat > 1.5 && sampling.coordinates[1].r_hat < 1.05);
+    // ArviZ finds 1.41 to 1.49 in five such sets of draws, and at most 1.01 in sets without such a chain.
+    let r_hats: Vec<f64> = sampling.coordinates.iter().map(|c| c.r_hat).collect();
+    assert!(r_hats[0] > 1.3 && r_hats[1] < 1.05, "{r_hats:?}");
     assert!(!sampling.meets);
     let trace = &sampling.traces[0];
     assert_eq!((trace.chains.len(), trace.burn_in, trace.label.as_str()), (4, 100, "length [m]"));
@@ -186,6 +189,26 @@ fn pages_are_made_of_what_is_there() {
     assert_eq!(value["gap"], serde_json::Value::Null);
 }
 
+#[test]
+fn a_gap_search_goes_on_while_its_process_works() {
+    let folder = tempfile::tempdir().unwrap();
+    half_written(folder.path());
+    let gap = || Watched::read(folder.path(), "rope").gap;
+    assert_eq!(gap(), None);
+    for part in ["7-gap", "7-gap-simulate", "7-power"] {
+        fs::create_dir(folder.path().join(part)).unwrap();
+        fs::write(folder.path().join(part).join("inputs.sha256"), "abc\n").unwrap();
+    }
+    let run = RunDirectory::open(folder.path()).unwrap();
+    let found = gap().unwrap();
+    assert_eq!((found.state, found.verdict.as_deref()), (GapState::Searching, None));
+    assert_eq!(found.parts, [("7-gap-simulate".to_owned(), false)]);
+    // Several may look at a time.
+    assert!((0..4).all(|_| RunDirectory::is_busy(folder.path())));
+    drop(run);
+    assert_eq!(gap().unwrap().state, GapState::Stopped);
+}
+
 #[cfg(unix)]
 #[test]
 fn links_out_of_the_folder_are_refused() {
@@ -213,5 +236,5 @@ fn links_out_of_the_folder_are_refused() {
     ] {
         assert!(matches!(served.answer(path, ""), Answer::Refused(403 | 404, _)), "{path}");
     }
-    assert!(matches!(served.answer("/runs/mine/same.toml", ""), Answer::File { length: 54.., .. }));
+    assert!(matches!(served.answer("/runs/mine/same.toml", ""), Answer::File { length: 48, .. }));
 }

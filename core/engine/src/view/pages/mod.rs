@@ -9,7 +9,6 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::page::number::duration;
 use crate::page::style;
 
 pub(super) use comparison::comparison;
@@ -74,8 +73,10 @@ fn ago(moment: u64) -> String {
     match now.saturating_sub(moment) {
         _ if moment == 0 => "–".to_owned(),
         0..=4 => "now".to_owned(),
-        days if days > 172_800 => format!("{} days ago", days / 86_400),
-        seconds => format!("{} ago", duration(seconds as f64)),
+        s @ 5..120 => format!("{s} s ago"),
+        s @ 120..7200 => format!("{} min ago", s / 60),
+        s @ 7200..172_800 => format!("{} h ago", s / 3600),
+        s => format!("{} days ago", s / 86_400),
     }
 }
 

@@ -46,12 +46,13 @@ fn content(found: &Watched, assessment: Option<&Assessment>) -> Markup {
             _ => (progress(found)),
         }
         @if finished && !found.row.parameters.is_empty() { (posterior(found)) }
-        @if !found.files.is_empty() { (files(found)) }
+        @if finished { (files(found)) }
         @if let Some(found) = &found.sampling { (sampling(found)) }
         @if let Some(found) = &found.campaign { (campaign(found)) }
         @if let Some(found) = &found.gap { (gap(found)) }
         @if finished && !found.figures.is_empty() { (gallery(found)) }
         (stages(&found.stages))
+        @if !finished { (files(found)) }
     }
 }
 
@@ -61,7 +62,14 @@ fn progress(found: &Watched) -> Markup {
     let present = found.progress.as_ref();
     html! {
         div.now {
-            p.what { (state(row.state)) @if let Some(stage) = &row.stage { " · " b { (stage) } } }
+            p.what {
+                (state(row.state))
+                @match (&row.stage, present.and_then(|p| p.ended.last())) {
+                    (Some(stage), _) => { " · " b { (stage) } }
+                    (None, Some(last)) => { " · after " b { (last.stage) } }
+                    (None, None) => {}
+                }
+            }
             @if let Some(p) = present.filter(|p| !p.stage.is_empty()) {
                 @if p.total > 0 {
                     progress max=(p.total) value=(p.done.min(p.total)) aria-label=(format!("progress of {}", p.stage)) {}
@@ -77,7 +85,7 @@ fn progress(found: &Watched) -> Markup {
             }
             @if let Some(reason) = &row.verdict { p { (paragraph(reason)) } }
             @if row.state == RunState::Stopped {
-                p { code { "lacuna resume" } " with its directory continues it." }
+                p { code { "lacuna resume RUN" } " continues it." }
             }
         }
         @let warnings = present.map(|p| p.warnings.as_slice()).unwrap_or_default();
