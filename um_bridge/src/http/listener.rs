@@ -13,7 +13,7 @@ const CONNECTIONS: usize = 512;
 
 /// A port that is bound and does not respond yet.
 pub struct Listener {
-    listener: TcpListener,
+    socket: TcpListener,
     address: SocketAddr,
     stopper: Stopper,
 }
@@ -49,8 +49,8 @@ pub(super) struct Shared<'a> {
 impl Listener {
     /// Binds a port of an address; port 0 takes any free port.
     pub fn bind(host: IpAddr, port: u16) -> io::Result<Self> {
-        let listener = TcpListener::bind((host, port))?;
-        let address = listener.local_addr()?;
+        let socket = TcpListener::bind((host, port))?;
+        let address = socket.local_addr()?;
         let mut reached = address;
         if host.is_unspecified() {
             reached.set_ip(match host {
@@ -59,7 +59,7 @@ impl Listener {
             });
         }
         let stopper = Stopper { stopped: Arc::default(), address: reached };
-        Ok(Self { listener, address, stopper })
+        Ok(Self { socket, address, stopper })
     }
 
     /// Address at which the server listens.
@@ -81,7 +81,7 @@ impl Listener {
             answered: AtomicU64::new(0),
         };
         std::thread::scope(|scope| {
-            for stream in self.listener.incoming() {
+            for stream in self.socket.incoming() {
                 if self.stopper.is_stopped() {
                     break;
                 }
