@@ -7,7 +7,7 @@ use lacuna::run::Stop;
 use lacuna_engine::view::{Answer, ServedFolder};
 use lacuna_um_bridge::http::{Body, Listener, Request, Response, Site};
 
-use crate::{misuse, print};
+use crate::{interrupt, misuse, print};
 
 /// Address at which the pages are served.
 #[derive(clap::Args)]
@@ -36,7 +36,7 @@ pub fn view(path: &Path, place: &Place) -> anyhow::Result<()> {
             .help("choose another port with `--port N`, or leave it out")
     })?;
     let stopper = listener.stopper();
-    ctrlc::set_handler(move || stopper.stop())
+    interrupt::when_asked(move |_| stopper.stop())
         .map_err(|error| Stop::new(format!("cannot wait for Ctrl-C: {error}")))?;
     let count = folder.names().len();
     let plural = if count == 1 { "" } else { "s" };

@@ -165,7 +165,7 @@ fn head(bytes: &[u8], longest: usize) -> Result<Option<Head>, Nothing> {
         let text = "a body of unknown length is not read: send `Content-Length`";
         return Err(Nothing::Refused(411, text.to_owned()));
     }
-    // A browser sends the origin of a page with its questions; a page that a user visits must not start the model.
+    // A browser sends the origin of a page with its questions; a page that a user visits must neither start a model nor read runs.
     if let Some(origin) = header("origin") {
         let text = format!("questions of web pages are not answered; this one is of `{origin}`");
         return Err(Nothing::Refused(403, text));

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::campaign::{Row, State, status};
+use crate::campaign::{Row, State, status_on_disk};
 
 /// Simulation runs of a run directory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,7 +41,7 @@ impl CampaignTable {
     /// Reads the state of the runs in a run directory, without asking a scheduler; `busy` is true if a process works there.
     /// `None` if no runs have been requested.
     pub(super) fn read(root: &Path, busy: bool) -> Option<Self> {
-        let status = match status(root, None, busy) {
+        let status = match status_on_disk(root, busy) {
             Ok(status) => status,
             Err(stop) => {
                 let warnings = vec![stop.to_string()];
