@@ -43,7 +43,7 @@ pub struct Present {
 pub struct EndedStage {
     /// Label of the stage.
     pub stage: String,
-    /// Its result in a few words.
+    /// Result of the stage in a few words.
     pub note: String,
 }
 

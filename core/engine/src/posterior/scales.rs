@@ -10,7 +10,7 @@ use super::Posterior;
 pub enum CoordinateScale {
     /// The value itself.
     Natural,
-    /// Its logarithm.
+    /// The logarithm of the value.
     Logarithmic,
     /// The place of a member in its population, which depends on location and scale of the population.
     OfPopulation,

@@ -24,9 +24,9 @@ pub enum Answer {
     File {
         /// The file, opened.
         file: File,
-        /// Its length in bytes.
+        /// Length of the file, in bytes.
         length: u64,
-        /// Its media type.
+        /// Media type of the file.
         kind: &'static str,
     },
     /// Another address.
@@ -129,14 +129,15 @@ fn in_json(value: &impl Serialize) -> Answer {
 
 /// Media type of a file by its extension. Browsers show what they know; the rest is saved.
 fn kind(name: &str) -> &'static str {
-    match name.rsplit_once('.').map_or("", |(_, extension)| extension) {
-        "html" => "text/html; charset=utf-8",
-        "svg" => "image/svg+xml",
-        "png" => "image/png",
-        "csv" => "text/csv; charset=utf-8",
-        "json" => "application/json",
-        "toml" | "txt" | "jsonl" | "sha256" => "text/plain; charset=utf-8",
-        "nc" => "application/x-netcdf",
+    let extension = name.rfind('.').map_or("", |dot| &name[dot..]);
+    match extension {
+        ".html" => "text/html; charset=utf-8",
+        ".svg" => "image/svg+xml",
+        ".png" => "image/png",
+        ".csv" => "text/csv; charset=utf-8",
+        ".json" => "application/json",
+        ".toml" | ".txt" | ".jsonl" | ".sha256" => "text/plain; charset=utf-8",
+        ".nc" => "application/x-netcdf",
         _ => "application/octet-stream",
     }
 }

@@ -29,6 +29,13 @@ pub struct ServedFolder {
     looked: Mutex<BTreeMap<String, Looked>>,
 }
 
+/// Name by which a folder with this name has an address: without what `address::parts` refuses.
+fn named(folder: &str) -> String {
+    let is_sound = |c: &char| !matches!(c, '/' | '\\' | ':') && !c.is_control();
+    let name: String = folder.trim_start_matches('.').chars().filter(is_sound).collect();
+    if name.is_empty() { "run".to_owned() } else { name }
+}
+
 /// Result of a look at a run.
 struct Looked {
     found: Arc<Watched>,
@@ -49,8 +56,8 @@ impl ServedFolder {
             return Err(stop.help("give a run directory, or the folder that holds them"));
         }
         let only = root.join(MARK).is_file().then(|| match root.file_name() {
-            Some(name) => name.to_string_lossy().into_owned(),
-            None => "run".to_owned(),
+            Some(name) => named(&name.to_string_lossy()),
+            None => named(""),
         });
         Ok(Self { root, only, looked: Mutex::default() })
     }

@@ -158,6 +158,12 @@ fn pages_are_made_of_what_is_there() {
         "ended": [], "warnings": ["<b>a warning</b>"], "stopped": null,
     });
     fs::write(rope.join("progress.json"), progress.to_string()).unwrap();
+    // A temporary folder has a hidden name.
+    let hidden = runs.path().join(".rope");
+    half_written(&hidden);
+    let served = ServedFolder::open(&hidden).unwrap();
+    assert_eq!(served.only(), Some("rope"));
+    assert!(matches!(served.answer("/runs/rope/", ""), Answer::Page(_)));
     let served = ServedFolder::open(runs.path()).unwrap();
     assert_eq!(served.names(), ["a rope+effect"]);
     let page = |path: &str| match served.answer(path, "") {
