@@ -13,7 +13,7 @@ use crate::terminal::{clean, tell};
 /// Interval between plain lines.
 const INTERVAL: Duration = Duration::from_secs(10);
 
-/// Where a command tells its progress: the terminal, or events for programs.
+/// Receiver of the progress of a command: the terminal, or events for programs.
 pub fn observer() -> Box<dyn Observer> {
     if events::are_on() { Box::new(Events::default()) } else { Box::new(Terminal::new()) }
 }
