@@ -17,7 +17,8 @@ use crate::quick;
 const CHECKS: &str = include_str!("browser/checks.js");
 
 /// Width of the window in pixels, and colours.
-const VIEWS: [(u32, &str); 4] = [(360, "light"), (1280, "light"), (1280, "dark"), (360, "dark")];
+pub const VIEWS: [(u32, &str); 4] =
+    [(360, "light"), (1280, "light"), (1280, "dark"), (360, "dark")];
 
 /// Starts of a browser that hangs, which it does now and then where many processes are at work, and the time of each.
 const STARTS: usize = 4;
@@ -80,6 +81,16 @@ fn told(dom: &str) -> Value {
         .replace("&quot;", "\"")
         .replace("&amp;", "&");
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: `{text}`"))
+}
+
+/// Findings of the checks in a page; `None` without a browser.
+pub fn wrong_in(page: &str, view: (u32, &str), folder: &Path) -> Option<Vec<String>> {
+    let address = framed(page, view, folder);
+    let arguments = ["--virtual-time-budget=15000", "--dump-dom", address.as_str()];
+    let (dom, _) = chromium(folder, &arguments.map(str::to_owned))?;
+    let told = told(&dom);
+    let text = |wrong: &Value| wrong.as_str().unwrap().to_owned();
+    Some(told["wrong"].as_array().unwrap().iter().map(text).collect())
 }
 
 #[test]

@@ -53,5 +53,6 @@ mod studies;
 mod tidy;
 mod truth;
 mod um_bridge;
+mod view;
 mod what_people_bring;
 mod worked;

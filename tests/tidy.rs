@@ -146,6 +146,8 @@ fn nothing_is_unsafe() {
     };
     for source in rust().iter().filter(|source| !boundary(source)) {
         for (i, line) in source.program() {
+            // A key word of the Content Security Policy of pages.
+            let line = line.replace("'unsafe-inline'", "");
             let words = line.split(|c: char| !c.is_alphanumeric() && c != '_');
             if words.into_iter().any(|word| word == "unsafe") && source.name != "tests/tidy.rs" {
                 found.push(format!("{}:{i}: {}", source.name, line.trim()));

@@ -16,6 +16,7 @@ mod study;
 mod terminal;
 #[cfg(test)]
 mod tests;
+mod view;
 mod work;
 
 use std::ffi::OsString;
@@ -201,6 +202,14 @@ enum Verb {
         #[command(flatten)]
         place: serve::Place,
     },
+    /// Show runs in a browser on this machine, with the progress of unfinished ones, until Ctrl-C; nothing is written
+    View {
+        /// Run directory, or folder of run directories
+        #[arg(default_value = "runs", value_name = "RUN|FOLDER")]
+        folder: PathBuf,
+        #[command(flatten)]
+        place: view::Place,
+    },
     /// Manage the simulation runs of a run directory: show their state, repeat failed ones, add more
     Campaign {
         #[command(subcommand)]
@@ -296,6 +305,7 @@ fn perform(verb: Verb) -> anyhow::Result<()> {
         Verb::Serve { study, settings, out, place } => {
             serve::serve(&study, &settings, out.as_deref(), &place)
         }
+        Verb::View { folder, place } => view::view(&folder, &place),
         Verb::Campaign { what } => campaign::campaign(&what),
         Verb::Work(asked) => work::run(&asked),
         Verb::New { what } => new::write(&what),

@@ -7,9 +7,10 @@
 //! `umbridge`.
 //!
 //! This crate does not depend on studies: the plugin `um_bridge` uses the client for a study's model, `lacuna serve`
-//! uses the server.
+//! uses the server, and `lacuna view` the HTTP below it.
 
 pub mod client;
+pub mod http;
 pub mod protocol;
 pub mod server;
 

@@ -3,125 +3,75 @@
 //! The number of evaluations in parallel is limited; further ones wait for their turn.
 
 mod answer;
-mod connection;
-mod http;
 mod model;
 mod turns;
 
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::time::Duration;
+use std::net::{IpAddr, SocketAddr};
 
-use crate::protocol::Fault;
+use crate::http::{Listener, Request, Response, Site};
+use crate::protocol::{Failed, Fault, INTERNAL_ERROR, INVALID_INPUT};
 
+pub use crate::http::Stopper;
 pub use model::Model;
 
 use turns::Turns;
 
-/// Largest number of open connections.
-const CONNECTIONS: usize = 512;
+/// Largest size of the body of a request, in bytes.
+const LONGEST_BODY: usize = 256 * 1024 * 1024;
 
 /// A server that has bound its port and does not respond yet.
-pub struct Server {
-    listener: TcpListener,
-    address: SocketAddr,
-    stopper: Stopper,
-}
-
-/// Stops a server, from any thread.
-#[derive(Clone)]
-pub struct Stopper {
-    stopped: Arc<AtomicBool>,
-    address: SocketAddr,
-}
-
-impl Stopper {
-    /// Makes the server complete its pending requests and end.
-    pub fn stop(&self) {
-        self.stopped.store(true, Ordering::SeqCst);
-        // The server is blocked waiting for a connection; this one makes it notice the flag.
-        let _ = TcpStream::connect_timeout(&self.address, Duration::from_secs(1));
-    }
-
-    fn is_stopped(&self) -> bool {
-        self.stopped.load(Ordering::SeqCst)
-    }
-}
+pub struct Server(Listener);
 
 /// Data shared by all connections.
 struct Shared<'a> {
     models: &'a [&'a dyn Model],
     turns: Turns,
-    stopper: &'a Stopper,
-    open: AtomicUsize,
-    answered: AtomicU64,
 }
 
 impl Server {
     /// Binds a port of an address; port 0 takes any free port.
     pub fn bind(host: IpAddr, port: u16) -> io::Result<Self> {
-        let listener = TcpListener::bind((host, port))?;
-        let address = listener.local_addr()?;
-        let mut reached = address;
-        if host.is_unspecified() {
-            reached.set_ip(match host {
-                IpAddr::V4(_) => Ipv4Addr::LOCALHOST.into(),
-                IpAddr::V6(_) => Ipv6Addr::LOCALHOST.into(),
-            });
-        }
-        let stopper = Stopper { stopped: Arc::default(), address: reached };
-        Ok(Self { listener, address, stopper })
+        Listener::bind(host, port).map(Self)
     }
 
     /// Address at which the server listens.
     pub fn address(&self) -> SocketAddr {
-        self.address
+        self.0.address()
     }
 
     /// A handle that stops the server.
     pub fn stopper(&self) -> Stopper {
-        self.stopper.clone()
+        self.0.stopper()
     }
 
     /// Responds to requests for these models, with at most `at_a_time` evaluations in parallel, until it is stopped;
     /// returns the number of requests served.
     pub fn serve(&self, models: &[&dyn Model], at_a_time: usize) -> u64 {
-        let shared = Shared {
-            models,
-            turns: Turns::of(at_a_time.max(1)),
-            stopper: &self.stopper,
-            open: AtomicUsize::new(0),
-            answered: AtomicU64::new(0),
-        };
-        std::thread::scope(|scope| {
-            for stream in self.listener.incoming() {
-                if self.stopper.is_stopped() {
-                    break;
-                }
-                let Ok(stream) = stream else {
-                    // Too many open files, or a client that has disconnected already: neither ends the server.
-                    std::thread::sleep(Duration::from_millis(10));
-                    continue;
-                };
-                if shared.open.fetch_add(1, Ordering::SeqCst) >= CONNECTIONS {
-                    connection::refuse(stream);
-                    shared.open.fetch_sub(1, Ordering::SeqCst);
-                    continue;
-                }
-                let shared = &shared;
-                let spawned = std::thread::Builder::new().spawn_scoped(scope, move || {
-                    connection::attend(stream, shared);
-                    shared.open.fetch_sub(1, Ordering::SeqCst);
-                });
-                if spawned.is_err() {
-                    shared.open.fetch_sub(1, Ordering::SeqCst);
-                }
-            }
-        });
-        shared.answered.into_inner()
+        self.0.serve(&Shared { models, turns: Turns::of(at_a_time.max(1)) })
     }
+}
+
+impl Site for Shared<'_> {
+    fn longest_body(&self) -> usize {
+        LONGEST_BODY
+    }
+
+    fn answer(&self, request: &Request) -> Response {
+        let (status, body) = answer::answer(request, self);
+        Response::json(status, body)
+    }
+
+    fn refusal(&self, status: u16, reason: String) -> Response {
+        let kind = if status >= 500 { INTERNAL_ERROR } else { INVALID_INPUT };
+        Response::json(status, fault(kind, reason))
+    }
+}
+
+/// Body of an error response.
+fn fault(kind: &str, message: String) -> String {
+    let failed = Failed { error: Fault::new(kind, message) };
+    serde_json::to_string(&failed).unwrap_or_default()
 }
 
 /// HTTP status of a fault, as in the reference implementation.

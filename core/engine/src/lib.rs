@@ -21,3 +21,4 @@ pub mod sensitivity;
 pub mod serve;
 pub mod stage;
 pub mod study;
+pub mod view;

@@ -13,6 +13,7 @@
 use lacuna::plugin::Density;
 use lacuna::plugin::registry::{NoKeys, Section};
 use lacuna::run::{Listener, Observer, Stop, files};
+use lacuna_run::progress::Recorded;
 use lacuna_run::{Kept, RunDirectory, Stage};
 
 use crate::gap::inside::{companion, runs};
@@ -129,6 +130,20 @@ pub fn power(
     independent(study)?;
     run.watch(study.faults());
     run.uses(study.libraries.all().map(|library| library.sha256.clone()));
+    let recorded = Recorded::new(run.root(), observer);
+    let rates = plant(study, design, simulations, run, &recorded);
+    recorded.finish(&rates);
+    rates
+}
+
+/// Stages of [`power`], and its page.
+fn plant(
+    study: &Study,
+    design: &PowerDesign,
+    simulations: Option<usize>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Rates, Stop> {
     let kept = if study.surrogate.is_some() {
         let (emulated, _) = calibrate_emulated(study, run, observer)?;
         power::stage(study, design, simulations, &emulated.problem(), run, observer)?
@@ -149,21 +164,32 @@ fn pursue(
 ) -> Result<Findings, Stop> {
     contents::before_all(study)?;
     manifest::begin(study, run)?;
-    let observer = &Listener::new(observer);
-    let findings = match (&study.target, &study.surrogate) {
-        (Some(given), _) => sample_target(study, given, run, observer)?,
+    let recorded = Recorded::new(run.root(), observer);
+    let listener = Listener::new(&recorded);
+    let findings = all_stages(study, goal, run, &listener)
+        .and_then(|findings| manifest::end(study, run).map(|()| findings));
+    recorded.finish(&findings);
+    findings
+}
+
+fn all_stages(
+    study: &Study,
+    goal: Goal<'_>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    match (&study.target, &study.surrogate) {
+        (Some(given), _) => sample_target(study, given, run, observer),
         (None, Some(_)) => {
             let (emulated, calibrated) = calibrate_emulated(study, run, observer)?;
-            conclude(study, goal, &emulated.problem(), calibrated.as_ref(), run, observer)?
+            conclude(study, goal, &emulated.problem(), calibrated.as_ref(), run, observer)
         }
         (None, None) => {
             let direct = Direct::of(study, run, observer)?.fitted(study, run, observer)?;
             let calibrated = calibrate_direct(study, &direct, run, observer)?;
-            conclude(study, goal, &direct.problem(), calibrated.as_ref(), run, observer)?
+            conclude(study, goal, &direct.problem(), calibrated.as_ref(), run, observer)
         }
-    };
-    manifest::end(study, run)?;
-    Ok(findings)
+    }
 }
 
 /// Stages of a study with a surrogate up to its emulator and the estimates of its errors.

@@ -108,8 +108,8 @@ fn is_taken(tried: &Result<(), TryLockError>) -> bool {
     matches!(tried, Err(TryLockError::WouldBlock))
 }
 
-pub(super) const RECORD: &str = "stage.json";
-pub(super) const INPUTS: &str = "inputs.sha256";
+pub(crate) const RECORD: &str = "stage.json";
+pub(crate) const INPUTS: &str = "inputs.sha256";
 
 /// Hash for which the folder of a stage was created: of the stage's inputs and of the code; empty if there is none.
 pub fn inputs_of(folder: &Path) -> String {
@@ -143,9 +143,11 @@ impl RunDirectory {
     }
 
     /// Returns true if a process is working in the folder.
+    ///
+    /// The folder may be read-only. Several processes may ask at a time: none of them is taken for one that works.
     pub fn is_busy(root: &Path) -> bool {
-        let lock = File::options().write(true).open(root.join(".lock"));
-        lock.is_ok_and(|lock| is_taken(&lock.try_lock()))
+        let lock = File::open(root.join(".lock"));
+        lock.is_ok_and(|lock| is_taken(&lock.try_lock_shared()))
     }
 
     /// Path of the folder.

@@ -1,4 +1,4 @@
-//! Files of a run: artifacts with their provenance, arrays, and the orders and markers of runs that other processes
+//! Files of a run: artifacts with their provenance, its progress, arrays, and the orders and markers of runs that other processes
 //! make.
 
 mod adopt;
@@ -7,7 +7,9 @@ pub mod directory;
 mod growth;
 pub mod made_by;
 pub mod process;
+pub mod progress;
 mod provenance;
+pub mod seen;
 pub mod stage;
 #[cfg(test)]
 mod testing;

@@ -5,10 +5,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::connection::fault;
-use super::http::Request;
 use super::model::unsupported;
-use super::{Model, Shared, status};
+use super::{Model, Shared, fault, status};
+use crate::http::Request;
 use crate::protocol::{
     About, ApplyHessian, ApplyJacobian, Config, Evaluate, Fault, Gradient, INTERNAL_ERROR,
     INVALID_INPUT, INVALID_OUTPUT, Info, InputSizes, MODEL_NOT_FOUND, ModelInfo, Output,

@@ -77,10 +77,26 @@ impl State {
 /// Status of the run directory of a study; `busy` is true if a process works in it.
 pub fn status(study: &Study, root: &Path, busy: bool) -> Result<Status, Stop> {
     let executor = study.executor.as_ref().map(|section| &*section.built.plugin);
+    gathered(root, executor, &|| design::run_names(study.trained()), busy)
+}
+
+/// Like [`status`], from the files of the run directory alone: no scheduler is asked, and runs that were added to the design
+/// appear when they are requested.
+pub fn status_on_disk(root: &Path, busy: bool) -> Result<Status, Stop> {
+    gathered(root, None, &|| Ok(Vec::new()), busy)
+}
+
+/// Status of a run directory; `names` returns the names of all runs of the design.
+fn gathered(
+    root: &Path,
+    executor: Option<&dyn Executor>,
+    names: &dyn Fn() -> Result<Vec<String>, Stop>,
+    busy: bool,
+) -> Result<Status, Stop> {
     let mut status = Status { runs: Vec::new(), warnings: Vec::new() };
     for (stage, folder, roll) in stages(root)? {
         let of_design = stage == Stage::Simulate.folder().name();
-        let mut added = if of_design { design::run_names(study.trained())? } else { Vec::new() };
+        let mut added = if of_design { names()? } else { Vec::new() };
         added.retain(|name| !roll.runs.contains(name));
         for (scenario, own) in &roll.scenarios {
             let folder = if own.as_os_str().is_empty() { folder.clone() } else { folder.join(own) };

@@ -17,7 +17,7 @@ use crate::stage::evidence;
 use mixture::{Predicted, Weights};
 
 pub use mixture::{Mixed, Spread};
-pub use show::text;
+pub use show::{names, tables, text};
 
 /// Results of one run that are compared.
 #[derive(Debug, Clone)]

@@ -1,4 +1,4 @@
-//! A comparison as text for a terminal.
+//! A comparison as tables, and as text for a terminal.
 
 use serde_json::Value;
 
@@ -6,24 +6,32 @@ use super::{Comparison, Entry, Mixed, Spread};
 use crate::page::number::{percent, significant};
 use crate::page::table::Table;
 
-/// Tables of a comparison, with one column per run.
-pub fn text(comparison: &Comparison) -> String {
-    let names: Vec<String> = (1..=comparison.runs.len()).map(|i| format!("({i})")).collect();
-    let mut parts = vec![legend(comparison, &names)];
-    for (title, table) in [
-        ("posterior: mean ± standard deviation", posterior(comparison, &names)),
-        ("standard deviation of a new replicate by origin", spread(comparison, &names)),
-        ("surrogate and fit", errors(comparison, &names)),
-        ("evidence and prediction", weights(comparison, &names)),
+/// Tables of a comparison with their titles, with one column per run; empty ones are left out.
+pub fn tables(comparison: &Comparison) -> Vec<(&'static str, Table)> {
+    let names = &names(comparison);
+    let all = [
+        ("posterior: mean ± standard deviation", posterior(comparison, names)),
+        ("standard deviation of a new replicate by origin", spread(comparison, names)),
+        ("surrogate and fit", errors(comparison, names)),
+        ("evidence and prediction", weights(comparison, names)),
         ("quantities predicted by the mixture of the studies", mixed(comparison)),
-        ("time", times(comparison, &names)),
-    ] {
-        if !table.is_empty() {
-            parts.push(format!("{title}\n{}", table.text()));
-        }
-    }
+        ("time", times(comparison, names)),
+    ];
+    all.into_iter().filter(|(_, table)| !table.is_empty()).collect()
+}
+
+/// Tables of a comparison as text, below the names of their columns.
+pub fn text(comparison: &Comparison) -> String {
+    let mut parts = vec![legend(comparison, &names(comparison))];
+    let tables = tables(comparison).into_iter();
+    parts.extend(tables.map(|(title, table)| format!("{title}\n{}", table.text())));
     parts.extend(comparison.notes.iter().map(|note| format!("note: {note}\n")));
     parts.join("\n")
+}
+
+/// Heads of the columns of the runs.
+pub fn names(comparison: &Comparison) -> Vec<String> {
+    (1..=comparison.runs.len()).map(|i| format!("({i})")).collect()
 }
 
 fn legend(comparison: &Comparison, names: &[String]) -> String {

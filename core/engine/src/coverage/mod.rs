@@ -11,6 +11,7 @@ use std::path::Path;
 
 use lacuna::diagnose::coverage::{Case, Coordinate, Coverage, Ended, Noise, tally};
 use lacuna::run::{Observer, Progress, Stop, files};
+use lacuna_run::progress::Recorded;
 use lacuna_run::{Artifact, RunDirectory, Stage};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -80,6 +81,19 @@ pub fn coverage(
 ) -> Result<Coverage, Stop> {
     refuse(study)?;
     directory.watch(study.faults());
+    let recorded = Recorded::new(directory.root(), observer);
+    let found = counted(study, asked, directory, &recorded);
+    recorded.finish(&found);
+    found
+}
+
+/// Cases of [`coverage`], their count and its page.
+fn counted(
+    study: &Study,
+    asked: &Asked,
+    directory: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Coverage, Stop> {
     let ground = Ground::of(study, asked, directory, observer)?;
     let inputs =
         json!([ground.inputs(), (asked.quick, ground.noise, ground.source), study.about.seed]);

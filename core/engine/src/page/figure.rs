@@ -42,8 +42,8 @@ impl Numbers {
         let number = self.files.len() + 1;
         let markup = html! {
             figure.drawn id=(format!("figure-{number}")) data-name=(name) {
-                @if !keys.is_empty() { div.legend { @for key in keys { (legend_key(key)) } } }
-                div.drawings { @for drawing in drawings { (forms(drawing)) } }
+                (legend(keys))
+                (drawn(drawings))
                 script type="text/plain" class="values" { (PreEscaped(packed(&table))) }
                 figcaption { b { "Figure " (number) ". " } (caption.html()) }
             }
@@ -76,6 +76,16 @@ impl Numbers {
     pub fn files(self) -> Vec<FigureFile> {
         self.files
     }
+}
+
+/// Drawings beside each other, as many as fit.
+pub fn drawn(drawings: &[Drawing]) -> Markup {
+    html! { div.drawings { @for drawing in drawings { (forms(drawing)) } } }
+}
+
+/// Legend of a figure.
+pub fn legend(keys: &[Key]) -> Markup {
+    html! { @if !keys.is_empty() { div.legend { @for key in keys { (legend_key(key)) } } } }
 }
 
 fn forms(drawing: &Drawing) -> Markup {

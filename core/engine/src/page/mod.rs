@@ -17,7 +17,7 @@ use maud::{Markup, html};
 
 use self::file::{DRAWING, PALETTE};
 
-pub use self::figure::{FigureFile, Numbers};
+pub use self::figure::{FigureFile, Numbers, drawn, legend};
 
 /// Section of the page.
 pub struct Section {

@@ -24,6 +24,7 @@ mod joint;
 mod members;
 mod mode;
 mod of_data;
+mod scales;
 
 pub use conditional::CutValues;
 pub use given::Given;
@@ -31,6 +32,7 @@ pub use information::Together;
 pub use joint::Joint;
 pub use mode::Mode;
 pub use of_data::OfData;
+pub use scales::CoordinateScale;
 
 use members::{Jacobian, Members};
 

@@ -16,6 +16,7 @@ pub use crate::gap::report::power::power_text;
 pub use crate::page::table::Table;
 pub use coverage::{coverage_page, coverage_text};
 pub use page::{page, render};
+pub use section::banner::banner;
 pub use summary::{ByName, Key, Quantity, SCHEMA, Summary, keys, schema, schema_of, summary};
 pub use terminal::{gap_text, next_text, summary_text};
 

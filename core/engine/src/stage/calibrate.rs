@@ -5,6 +5,7 @@ mod estimated;
 mod kept;
 mod law;
 mod near;
+mod outline;
 mod population;
 mod predicting;
 mod sample;
@@ -33,6 +34,7 @@ use sample::{Asked, sample};
 pub use cut::CutOutcome;
 pub use estimated::LikelihoodEstimate;
 pub use law::Law;
+pub use outline::{Outline, OutlinedCoordinate};
 pub use population::{MemberOutcome, NewMember, PopulationOutcome};
 
 /// The posterior as draws, with its maximum.

@@ -4,6 +4,7 @@
 //! that depend on the draws alone.
 
 mod log;
+pub mod look;
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -97,12 +98,12 @@ pub fn sample(
             step += 1;
             progress.add(1);
             if written.elapsed() > interval {
-                log.checkpoint(step, &state)?;
+                log.checkpoint(step, limit, &state)?;
                 // Short runs are checkpointed early; in long runs writing takes a negligible part of the time.
                 (written, interval) = (Instant::now(), INTERVAL.min(2 * interval));
             }
         }
-        log.checkpoint(step, &state)?;
+        log.checkpoint(step, limit, &state)?;
         match rule {
             Some(rule) if !sampler.finished(&state) => {
                 let read = log.read(limit)?;

@@ -121,7 +121,8 @@ fn pieces(study: &Study) -> Value {
     }
 }
 
-fn summary(result: &GapResult) -> String {
+/// The verdict of a search in a few words.
+pub fn summary(result: &GapResult) -> String {
     let names: Vec<&str> = result.additions.iter().map(|a| a.name.as_str()).collect();
     match result.verdict.word {
         VerdictKind::None => "data and model agree within the noise".to_owned(),

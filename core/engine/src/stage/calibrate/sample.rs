@@ -12,7 +12,7 @@ use lacuna_linalg::Matrix;
 
 use super::estimated::{Estimated, LikelihoodEstimate};
 use super::slopes::contradiction;
-use super::{Calibrated, Coordinate, Outcome, near, population};
+use super::{Calibrated, Coordinate, Outcome, Outline, near, population};
 use crate::posterior::Posterior;
 use crate::stage::sampling::{self, Length, Sampled};
 use crate::stage::start::{inside, maxima, sobol};
@@ -70,6 +70,9 @@ pub(super) fn sample(
         stop: section.common.stop.as_ref(),
         half: asked.quick,
     };
+    if !asked.quick {
+        Outline::of(posterior, &coordinates, sampler, length.burn_in).write(folder)?;
+    }
     let mut sampled = sampling::sample(
         &*section.built.plugin,
         target,

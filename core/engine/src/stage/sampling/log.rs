@@ -13,6 +13,11 @@ use lacuna::run::{Stop, files};
 use lacuna_linalg::Matrix;
 use serde::{Deserialize, Serialize};
 
+/// File of the records.
+pub(super) const DRAWS: &str = "draws.bin";
+/// File of the checkpoint.
+pub(super) const STATE: &str = "state.json";
+
 /// A state and the number of steps after which it is valid.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Checkpoint {
@@ -22,7 +27,44 @@ pub(super) struct Checkpoint {
     pub inputs: String,
     pub state: State,
     #[serde(default)]
-    statistics: Vec<(String, Kind)>,
+    pub(super) statistics: Vec<(String, Kind)>,
+    /// Number of steps after which the run ends or decides to go on.
+    #[serde(default)]
+    pub planned: usize,
+}
+
+/// Size of a record: the values and the acceptance of each chain at one step.
+#[derive(Clone, Copy)]
+pub(super) struct Shape {
+    pub chains: usize,
+    pub dimension: usize,
+    /// Number of statistics.
+    pub told: usize,
+}
+
+impl Shape {
+    /// Number of values of a chain in one step: point, log density and statistics.
+    pub fn numbers(self) -> usize {
+        self.dimension + 1 + self.told
+    }
+
+    /// Number of bytes of one step: the values and the acceptance of each chain.
+    pub fn bytes(self) -> usize {
+        self.chains * (8 * self.numbers() + 1)
+    }
+
+    /// Points (`chains x dimension`) and log densities in a record.
+    pub fn points(self, record: &[u8]) -> (Matrix, Vec<f64>) {
+        let point = |c: usize, j: usize| number(record, 8 * (c * self.numbers() + j));
+        let points = Matrix::from_fn(self.chains, self.dimension, point);
+        (points, (0..self.chains).map(|c| point(c, self.dimension)).collect())
+    }
+}
+
+fn number(bytes: &[u8], at: usize) -> f64 {
+    let mut word = [0; 8];
+    word.copy_from_slice(&bytes[at..at + 8]);
+    f64::from_le_bytes(word)
 }
 
 /// Records of a run.
@@ -53,22 +95,21 @@ fn names(statistics: &[Statistic]) -> Vec<(String, Kind)> {
 
 impl Log {
     pub fn open(folder: &Path, chains: usize, dimension: usize) -> Result<Self, Stop> {
-        let path = folder.join("draws.bin");
+        let path = folder.join(DRAWS);
         let open = OpenOptions::new().create(true).append(true).open(&path);
         let file = BufWriter::new(open.map_err(|error| files::cannot_write(&path, &error))?);
-        let (state_path, statistics) = (folder.join("state.json"), Vec::new());
+        let (state_path, statistics) = (folder.join(STATE), Vec::new());
         let inputs = lacuna_run::inputs_of(folder);
         Ok(Self { path, state_path, inputs, file, chains, dimension, statistics })
     }
 
-    /// Number of values of a chain in one step: point, log density and statistics.
-    fn numbers(&self) -> usize {
-        self.dimension + 1 + self.statistics.len()
+    fn shape(&self) -> Shape {
+        Shape { chains: self.chains, dimension: self.dimension, told: self.statistics.len() }
     }
 
-    /// Number of bytes of one step: the values and the acceptance of each chain.
+    /// Number of bytes of one step.
     fn record(&self) -> usize {
-        self.chains * (8 * self.numbers() + 1)
+        self.shape().bytes()
     }
 
     /// Reads the last checkpoint and truncates the file to it; without a checkpoint the file is emptied. `told` returns
@@ -117,11 +158,12 @@ impl Log {
         write().map_err(|error| files::cannot_write(&self.path, &error))
     }
 
-    pub fn checkpoint(&mut self, step: usize, state: &State) -> Result<(), Stop> {
+    /// Writes a state, valid after `step` of `planned` steps.
+    pub fn checkpoint(&mut self, step: usize, planned: usize, state: &State) -> Result<(), Stop> {
         let flushed = self.file.flush().and_then(|()| self.file.get_ref().sync_data());
         flushed.map_err(|error| files::cannot_write(&self.path, &error))?;
         let (inputs, statistics) = (self.inputs.clone(), self.statistics.clone());
-        let checkpoint = Checkpoint { step, inputs, state: state.clone(), statistics };
+        let checkpoint = Checkpoint { step, inputs, state: state.clone(), statistics, planned };
         files::write_json(&self.state_path, &checkpoint)
     }
 
@@ -135,29 +177,22 @@ impl Log {
         if bytes.len() != steps * record {
             return Err(Stop::new(format!("{} has the wrong length", self.path.display())));
         }
-        let number = |at: usize| {
-            let mut word = [0; 8];
-            word.copy_from_slice(&bytes[at..at + 8]);
-            f64::from_le_bytes(word)
-        };
+        let shape = self.shape();
         let mut records = Vec::with_capacity(steps);
         let mut moves = vec![0_u32; chains];
         for step in 0..steps {
-            let from = step * record;
-            let point = |c: usize, j: usize| number(from + 8 * (c * self.numbers() + j));
-            let points = Matrix::from_fn(chains, d, point);
-            let density = (0..chains).map(|c| point(c, d)).collect();
-            records.push((points, density));
+            let own = &bytes[step * record..(step + 1) * record];
+            records.push(shape.points(own));
             for (c, count) in moves.iter_mut().enumerate() {
-                *count += u32::from(bytes[from + 8 * chains * self.numbers() + c]);
+                *count += u32::from(own[8 * chains * shape.numbers() + c]);
             }
         }
         let acceptance = moves.iter().map(|&m| f64::from(m) / steps.max(1) as f64).collect();
         let mut values = Vec::with_capacity(self.statistics.len() * chains * steps);
         for s in 0..self.statistics.len() {
             for c in 0..chains {
-                let at = |step| step * record + 8 * (c * self.numbers() + d + 1 + s);
-                values.extend((0..steps).map(|step| number(at(step))));
+                let at = |step| step * record + 8 * (c * shape.numbers() + d + 1 + s);
+                values.extend((0..steps).map(|step| number(&bytes, at(step))));
             }
         }
         let names = self.statistics.clone();

@@ -1,12 +1,12 @@
 //! One client connection: its requests, one after the other.
 
 use std::net::TcpStream;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use super::http::{Nothing, Reader};
-use super::{Shared, answer};
-use crate::protocol::{Failed, Fault, INTERNAL_ERROR, INVALID_INPUT};
+use super::listener::Shared;
+use super::reader::{Nothing, Reader};
 
 /// Interval at which an idle connection checks whether the server is stopping.
 const GLANCE: Duration = Duration::from_millis(200);
@@ -22,20 +22,25 @@ pub(super) fn attend(stream: TcpStream, shared: &Shared<'_>) {
     if prepared.is_err() {
         return;
     }
-    let mut reader = Reader::new(stream);
+    let site = shared.site;
+    let mut reader = Reader::new(stream, site.longest_body());
     loop {
         match reader.next(|| shared.stopper.is_stopped()) {
             Ok(request) => {
-                let (status, body) = answer::answer(&request, shared);
+                // A panic must fail only its own request.
+                let response = catch_unwind(AssertUnwindSafe(|| site.answer(&request)));
+                let response =
+                    response.unwrap_or_else(|_| site.refusal(500, "the server failed".to_owned()));
                 shared.answered.fetch_add(1, Ordering::Relaxed);
                 let stays = request.stays && !shared.stopper.is_stopped();
-                if reader.answer(status, &body, stays).is_err() || !stays {
+                let head_only = request.method == "HEAD";
+                if reader.answer(response, head_only, stays).is_err() || !stays {
                     return;
                 }
             }
             Err(Nothing::Refused(status, reason)) => {
                 // The client may have disconnected already; then the reason reaches nobody.
-                let _ = reader.answer(status, &fault(INVALID_INPUT, reason), false);
+                let _ = reader.answer(site.refusal(status, reason), false, false);
                 return;
             }
             Err(Nothing::End) => return,
@@ -44,15 +49,9 @@ pub(super) fn attend(stream: TcpStream, shared: &Shared<'_>) {
 }
 
 /// Rejects a client because there are too many.
-pub(super) fn refuse(stream: TcpStream) {
+pub(super) fn refuse(stream: TcpStream, shared: &Shared<'_>) {
     let _ = stream.set_write_timeout(Some(GLANCE));
-    let mut reader = Reader::new(stream);
+    let mut reader = Reader::new(stream, 0);
     let text = "too many connections are open".to_owned();
-    let _ = reader.answer(503, &fault(INTERNAL_ERROR, text), false);
-}
-
-/// Body of an error response.
-pub(super) fn fault(kind: &str, message: String) -> String {
-    let failed = Failed { error: Fault::new(kind, message) };
-    serde_json::to_string(&failed).unwrap_or_default()
+    let _ = reader.answer(shared.site.refusal(503, text), false, false);
 }

@@ -1,29 +1,16 @@
-//! The subset of HTTP/1.1 (RFC 9112) that the protocol needs: a method, a path, a body of known length.
+//! Requests of a connection, and responses to them.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
+use super::{Body, Request, Response};
+
 /// Largest size of the head of a request, in bytes.
 const LONGEST_HEAD: usize = 16 * 1024;
-/// Largest size of a body, in bytes.
-const LONGEST_BODY: usize = 256 * 1024 * 1024;
 /// Longest pause of a client in the middle of a request.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// Time for which a connection stays open without a request.
 const IDLE: Duration = Duration::from_secs(120);
-
-/// A request.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) struct Request {
-    /// Method: `GET` or `POST`.
-    pub(super) method: String,
-    /// Path without the query.
-    pub(super) path: String,
-    /// Body of the request.
-    pub(super) body: Vec<u8>,
-    /// True if the client keeps the connection open.
-    pub(super) stays: bool,
-}
 
 /// Outcome of waiting for a request, other than a request.
 #[derive(Debug, PartialEq, Eq)]
@@ -38,6 +25,8 @@ pub(super) enum Nothing {
 struct Head {
     method: String,
     path: String,
+    query: String,
+    host: Option<String>,
     length: usize,
     stays: bool,
     /// True if the client waits for `100 Continue` before it sends the body.
@@ -51,21 +40,25 @@ pub(super) struct Reader<S> {
     stream: S,
     /// Bytes read beyond the last request.
     buffer: Vec<u8>,
+    /// Largest size of a body, in bytes.
+    longest: usize,
 }
 
 impl<S: Read + Write> Reader<S> {
-    pub(super) fn new(stream: S) -> Self {
-        Self { stream, buffer: Vec::new() }
+    pub(super) fn new(stream: S, longest: usize) -> Self {
+        Self { stream, buffer: Vec::new(), longest }
     }
 
     /// Waits for the next request; `stop` returns true if waiting should end.
     pub(super) fn next(&mut self, stop: impl Fn() -> bool) -> Result<Request, Nothing> {
         let head = loop {
-            if let Some(head) = head(&self.buffer)? {
-                break head;
-            }
-            if self.buffer.len() > LONGEST_HEAD {
+            let found = head(&self.buffer, self.longest)?;
+            let length = found.as_ref().map_or(self.buffer.len(), |head| head.end);
+            if length > LONGEST_HEAD {
                 return Err(Nothing::Refused(431, "the head of the request is too long".into()));
+            }
+            if let Some(head) = found {
+                break head;
             }
             let idle = self.buffer.is_empty();
             let patience = if idle { IDLE } else { PATIENCE };
@@ -81,7 +74,8 @@ impl<S: Read + Write> Reader<S> {
         }
         let rest = self.buffer.split_off(whole);
         let body = std::mem::replace(&mut self.buffer, rest).split_off(head.end);
-        Ok(Request { method: head.method, path: head.path, body, stays: head.stays })
+        let Head { method, path, query, host, stays, .. } = head;
+        Ok(Request { method, path, query, host, body, stays })
     }
 
     /// Reads more bytes, waiting at most for `patience`.
@@ -102,16 +96,46 @@ impl<S: Read + Write> Reader<S> {
         Err(Nothing::End)
     }
 
-    /// Writes a response.
-    pub(super) fn answer(&mut self, status: u16, body: &str, stays: bool) -> io::Result<()> {
-        let reason = reason(status);
-        let length = body.len();
+    /// Writes a response; without its body if only the head was asked.
+    pub(super) fn answer(
+        &mut self,
+        response: Response,
+        head_only: bool,
+        stays: bool,
+    ) -> io::Result<()> {
+        let Response { status, kind, headers, body } = response;
+        let length = match &body {
+            Body::Bytes(bytes) => bytes.len() as u64,
+            Body::File(_, length) => *length,
+        };
         let connection = if stays { "keep-alive" } else { "close" };
-        let text = format!(
-            "HTTP/1.1 {status} {reason}\r\nContent-Type: application/json\r\n\
-             Content-Length: {length}\r\nConnection: {connection}\r\n\r\n{body}"
+        let mut text = format!(
+            "HTTP/1.1 {status} {}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n\
+             Connection: {connection}\r\n",
+            reason(status)
         );
-        self.stream.write_all(text.as_bytes())?;
+        for (name, value) in headers {
+            // A value with an end of line would begin a header of its own.
+            let value: String = value.chars().filter(|c| !c.is_control()).collect();
+            text.push_str(&format!("{name}: {value}\r\n"));
+        }
+        text.push_str("\r\n");
+        let mut bytes = text.into_bytes();
+        match body {
+            _ if head_only => self.stream.write_all(&bytes)?,
+            Body::Bytes(body) => {
+                bytes.extend(body);
+                self.stream.write_all(&bytes)?;
+            }
+            Body::File(file, length) => {
+                self.stream.write_all(&bytes)?;
+                let sent = io::copy(&mut file.take(length), &mut self.stream)?;
+                if sent < length {
+                    // The file has become shorter: only a closed connection tells the client.
+                    return Err(io::Error::from(ErrorKind::UnexpectedEof));
+                }
+            }
+        }
         self.stream.flush()
     }
 }
@@ -121,7 +145,7 @@ fn is_pause(error: &io::Error) -> bool {
 }
 
 /// Parses the head at the beginning of these bytes; `None` if it is not complete yet.
-fn head(bytes: &[u8]) -> Result<Option<Head>, Nothing> {
+fn head(bytes: &[u8], longest: usize) -> Result<Option<Head>, Nothing> {
     let mut headers = [httparse::EMPTY_HEADER; 100];
     let mut request = httparse::Request::new(&mut headers);
     let end = match request.parse(bytes) {
@@ -130,7 +154,9 @@ fn head(bytes: &[u8]) -> Result<Option<Head>, Nothing> {
         Err(error) => return Err(Nothing::Refused(400, format!("this is no HTTP: {error}"))),
     };
     let method = request.method.unwrap_or_default().to_owned();
-    let path = request.path.unwrap_or_default().split('?').next().unwrap_or_default().to_owned();
+    let target = request.path.unwrap_or_default();
+    let (path, query) = target.split_once('?').unwrap_or((target, ""));
+    let (path, query) = (path.to_owned(), query.to_owned());
     let header = |name: &str| {
         let found = request.headers.iter().find(|h| h.name.eq_ignore_ascii_case(name));
         found.map(|h| String::from_utf8_lossy(h.value).trim().to_ascii_lowercase())
@@ -139,7 +165,7 @@ fn head(bytes: &[u8]) -> Result<Option<Head>, Nothing> {
         let text = "a body of unknown length is not read: send `Content-Length`";
         return Err(Nothing::Refused(411, text.to_owned()));
     }
-    // A browser sends the origin of a page with its questions; a page that a user visits must not start the model.
+    // A browser sends the origin of a page with its questions; a page that a user visits must neither start a model nor read runs.
     if let Some(origin) = header("origin") {
         let text = format!("questions of web pages are not answered; this one is of `{origin}`");
         return Err(Nothing::Refused(403, text));
@@ -155,8 +181,8 @@ fn head(bytes: &[u8]) -> Result<Option<Head>, Nothing> {
             Nothing::Refused(400, format!("`Content-Length` is `{text}`, not a number of bytes"))
         })?,
     };
-    if length > LONGEST_BODY {
-        let text = format!("a body of {length} bytes is too long; the most is {LONGEST_BODY}");
+    if length > longest {
+        let text = format!("a body of {length} bytes is too long; the most is {longest}");
         return Err(Nothing::Refused(413, text));
     }
     let connection = header("connection").unwrap_or_default();
@@ -165,18 +191,24 @@ fn head(bytes: &[u8]) -> Result<Option<Head>, Nothing> {
         _ => connection.contains("keep-alive"),
     };
     let waits = header("expect").is_some_and(|text| text == "100-continue");
-    Ok(Some(Head { method, path, length, stays, waits, end }))
+    // Two of them are no proof of either.
+    let hosts = request.headers.iter().filter(|h| h.name.eq_ignore_ascii_case("host")).count();
+    let host = header("host").filter(|_| hosts == 1);
+    Ok(Some(Head { method, path, query, host, length, stays, waits, end }))
 }
 
 fn reason(status: u16) -> &'static str {
     match status {
         200 => "OK",
+        303 => "See Other",
         400 => "Bad Request",
         403 => "Forbidden",
         404 => "Not Found",
         405 => "Method Not Allowed",
+        409 => "Conflict",
         411 => "Length Required",
         413 => "Content Too Large",
+        421 => "Misdirected Request",
         431 => "Request Header Fields Too Large",
         503 => "Service Unavailable",
         _ => "Internal Server Error",
