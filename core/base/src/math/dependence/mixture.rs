@@ -211,7 +211,7 @@ struct Logs<'a> {
     /// Logarithms of weight and of the factor's determinant, by component.
     constants: Vec<(f64, f64)>,
     white: Vec<f64>,
-    logs: Vec<f64>,
+    values: Vec<f64>,
 }
 
 impl<'a> Logs<'a> {
@@ -224,20 +224,20 @@ impl<'a> Logs<'a> {
             mixture,
             constants: mixture.components.iter().map(constants).collect(),
             white: Vec::new(),
-            logs: Vec::new(),
+            values: Vec::new(),
         }
     }
 
     fn at(&mut self, z: &[f64]) -> &[f64] {
-        let Self { mixture, constants, white, logs } = self;
-        logs.clear();
+        let Self { mixture, constants, white, values } = self;
+        values.clear();
         for (component, (log_weight, log_factor)) in mixture.components.iter().zip(constants) {
             component.whiten(z, white);
             let square: f64 = white.iter().map(|w| w * w).sum();
             let log_density = -0.5 * square - *log_factor - z.len() as f64 * HALF_LN_TWO_PI;
-            logs.push(*log_weight + log_density);
+            values.push(*log_weight + log_density);
         }
-        logs
+        values
     }
 }
 
