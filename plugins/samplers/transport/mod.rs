@@ -62,7 +62,7 @@ const SHORTEST_WARM_UP: usize = 150;
 /// Rounds of the warm-up: the last one learns no map, but the step size for the last map.
 const ROUNDS: usize = 3;
 /// Largest R-hat of a coordinate with which the draws of a round are a sample of one distribution, if a poor one.
-const LARGEST_R_HAT: f64 = 2.0;
+const LARGEST_R_HAT: f64 = 1.5;
 /// Largest number of values of which a map is fitted: of more, every second, third ... step is taken.
 const MOST_VALUES: usize = 20_000;
 

@@ -16,17 +16,11 @@ use super::quadrature::Projection;
 use super::search::{Best, Output, Search};
 use super::slopes::{self, Slopes};
 use super::terms::{Basis, Sets};
-use crate::surrogates::principal_components::{Components, PrincipalComponents};
+use crate::surrogates::principal_components::PrincipalComponents;
 
 /// Standard deviation over the runs, as a fraction of the largest response, below which an output counts as constant:
 /// what is left are rounding errors (such as the strain of a sensor before the wave arrives).
 const ROUND_OFF: f64 = 1e-13;
-
-/// Number of runs, and of values (runs times outputs), above both of which principal components are fitted by default.
-const MANY_RUNS: usize = 1000;
-const MANY_VALUES: usize = 1_000_000;
-/// Fraction of the variance that these components leave out at most.
-const LEFT_OUT: f64 = 1e-5;
 
 /// Largest degree that is low enough for a warning if the number of terms allows no higher one.
 const LOW_DEGREE: usize = 3;
@@ -77,10 +71,7 @@ pub(super) fn fit(
     };
     problem.check_level()?;
     let outputs = problem.outputs(training.responses, training.gradients);
-    let size = training.responses.as_slice().len();
-    let many = size > MANY_VALUES && runs > MANY_RUNS;
-    let usual = || many.then_some(Components::Variance(1.0 - LEFT_OUT));
-    let expansion = match options.components.or_else(usual) {
+    let expansion = match options.components {
         Some(components) => {
             let components = components.of(training.responses)?;
             let of_scores = training

@@ -109,8 +109,7 @@ pub struct PolynomialChaos {
     pub selection: Selection,
     /// Principal components of the outputs, fitted in place of the outputs: `{ variance = 0.9999 }` for as many as
     /// carry this fraction of the variance, or `{ count = 20 }`. This saves time with thousands of outputs; the part
-    /// that the components leave out is added to the emulator's error. `"none"` fits the outputs themselves. Default: the
-    /// outputs themselves up to 1000 runs or a million values (runs times outputs), above `{ variance = 0.99999 }`.
+    /// that the components leave out is added to the emulator's error. Default: the outputs themselves.
     pub components: Option<Components>,
 }
 
@@ -328,4 +327,4 @@ impl Surrogate for PolynomialChaos {
     }
 }
 
-lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"], revision = 3);
+lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"], revision = 2);
