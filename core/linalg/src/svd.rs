@@ -22,8 +22,14 @@ pub fn thin_svd(a: &Matrix) -> Result<Svd, Error> {
     finite(a)?;
     on_one_thread();
     let svd = view(a).thin_svd().map_err(|_| Error::NotConverged)?;
-    let values = (0..a.rows().min(a.columns())).map(|i| svd.S().column_vector()[i]).collect();
-    let (mut u, mut v) = (copied(svd.U()), copied(svd.V()));
+    let found: Vec<f64> =
+        (0..a.rows().min(a.columns())).map(|i| svd.S().column_vector()[i]).collect();
+    // For large matrices with singular values of zero the library returns some of these first.
+    let mut order: Vec<usize> = (0..found.len()).collect();
+    order.sort_by(|&i, &j| found[j].total_cmp(&found[i]));
+    let values = order.iter().map(|&i| found[i]).collect();
+    let (mut u, mut v) =
+        (copied(svd.U()).select_columns(&order), copied(svd.V()).select_columns(&order));
     for (j, sign) in column_signs(&v).into_iter().enumerate() {
         scale_column(&mut u, j, sign);
         scale_column(&mut v, j, sign);
@@ -70,5 +76,20 @@ mod tests {
     fn what_is_not_finite_is_refused() {
         let a = Matrix::from_rows(2, [[1.0, f64::NEG_INFINITY]]);
         assert_eq!(thin_svd(&a), Err(Error::NotFinite { row: 0, column: 1 }));
+    }
+
+    /// A thousand columns that are copies of ten, whose Gram matrix is a hundred times that of the ten.
+    #[test]
+    fn values_of_many_copies_are_in_order() {
+        let function = |i: usize, j: usize| ((i * i + 5 * (j % 10)) as f64).sin();
+        let whole = Matrix::from_fn(1001, 1000, function);
+        let found = thin_svd(&whole).unwrap();
+        let few = symmetric_eigen(&gram(&Matrix::from_fn(1001, 10, function))).unwrap().values;
+        let mut expected: Vec<f64> = few.iter().map(|x| (100.0 * x.max(0.0)).sqrt()).collect();
+        expected.sort_by(|a, b| b.total_cmp(a));
+        for (value, expected) in found.values.iter().zip(&expected) {
+            assert!((value - expected).abs() < 1e-5 * found.values[0], "{value} {expected}");
+        }
+        assert!(found.values.windows(2).all(|pair| pair[0] >= pair[1]));
     }
 }
