@@ -77,13 +77,7 @@ impl NoUTurn {
 impl Component for NoUTurn {
     fn check(&self, _context: &Context<'_>, complaints: &mut Complaints<'_>) {
         self.settings().check(complaints);
-        if !(1..=20).contains(&self.depth) {
-            complaints
-                .at("depth")
-                .say("trajectories would have no or too many steps")
-                .expected("a whole number from 1 to 20")
-                .found(self.depth);
-        }
+        tree::check_depth(self.depth, complaints);
     }
 }
 

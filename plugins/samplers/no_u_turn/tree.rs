@@ -2,6 +2,7 @@
 
 use lacuna::math::random::uniform;
 use lacuna::math::special::ln_sum_exp;
+use lacuna::text::Complaints;
 use lacuna_linalg::vector::dot;
 use rand::Rng;
 
@@ -103,6 +104,17 @@ impl<R: Rng> Builder<'_, '_, R> {
         }
         self.acceptance += (-error).exp().min(1.0);
         Some(Tree::leaf(phase, -error))
+    }
+}
+
+/// Reports a depth with which trajectories would have no step, or more than can be made.
+pub(crate) fn check_depth(depth: u32, complaints: &mut Complaints<'_>) {
+    if !(1..=20).contains(&depth) {
+        complaints
+            .at("depth")
+            .say("trajectories would have no or too many steps")
+            .expected("a whole number from 1 to 20")
+            .found(depth);
     }
 }
 

@@ -187,13 +187,7 @@ impl Component for Transport {
                 .expected(format!("at least {SHORTEST_WARM_UP}"))
                 .found(self.warm_up);
         }
-        if !(1..=20).contains(&self.depth) {
-            complaints
-                .at("depth")
-                .say("trajectories would have no or too many steps")
-                .expected("a whole number from 1 to 20")
-                .found(self.depth);
-        }
+        tree::check_depth(self.depth, complaints);
     }
 }
 
