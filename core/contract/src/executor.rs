@@ -123,7 +123,7 @@ fn run(
         most -= 1;
         let outcome = end.outcome.and_then(|made| {
             let stored = arrays::read(&folder.join(made.file), &layout.name);
-            let stored = stored.map_err(|stop| format!("no sound file: {stop}"))?.values;
+            let stored = stored.map_err(|stop| format!("no sound file: {stop}"))?.into_values();
             Ok((stored, made.valid))
         });
         if end.seconds.is_nan() || end.seconds < 0.0 {

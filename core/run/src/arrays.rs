@@ -1,54 +1,66 @@
 //! Named arrays in a NetCDF file: the format in which stages store numbers, readable by every netCDF tool.
 
+use std::borrow::Cow;
+use std::io;
 use std::path::Path;
 
 use lacuna::data::{Axis, Coordinates, Layout};
 use lacuna::matrix::Matrix;
 use lacuna::plugin::model::Response;
 use lacuna::run::{Stop, files};
-use netcdf_reader::NcFile;
+use netcdf_reader::{NcFile, NcType, NcVariable};
 use netcdf_writer::{NcAttrValue, NcFileBuilder, NcWriteFormat, NcWriteOptions};
 
 /// An array with named dimensions.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Array {
+pub struct Array<'a> {
     /// Name of the array.
     pub name: String,
     /// Name and length of each dimension, slowest-varying first.
     pub dimensions: Vec<(String, usize)>,
     /// Values, row-major.
-    pub values: Vec<f64>,
+    pub values: Cow<'a, [f64]>,
     /// Unit, if there is one.
     pub unit: Option<String>,
 }
 
-impl Array {
-    /// An array from a matrix, with names for its rows and columns.
-    pub fn matrix(name: &str, rows: &str, columns: &str, matrix: &Matrix) -> Self {
+impl<'a> Array<'a> {
+    /// An array of a matrix's numbers, with names for its rows and columns.
+    pub fn matrix(name: &str, rows: &str, columns: &str, matrix: &'a Matrix) -> Self {
         let dimensions =
             vec![(rows.to_owned(), matrix.rows()), (columns.to_owned(), matrix.columns())];
-        Self { name: name.to_owned(), dimensions, values: matrix.as_slice().to_vec(), unit: None }
+        Self { name: name.to_owned(), dimensions, values: matrix.as_slice().into(), unit: None }
+    }
+
+    /// The values alone.
+    pub fn into_values(self) -> Vec<f64> {
+        self.values.into_owned()
     }
 
     /// The array as a matrix: the first dimension becomes the rows, all others together the columns.
     pub fn into_matrix(self) -> Matrix {
         let rows = self.dimensions.first().map_or(1, |d| d.1);
         let columns = self.dimensions.iter().skip(1).map(|d| d.1).product();
-        Matrix::from_vec(rows, columns, self.values)
+        Matrix::from_vec(rows, columns, self.values.into_owned())
     }
 }
 
 /// Writes arrays and text attributes as a classic netCDF file with 64-bit offsets.
-pub fn write(path: &Path, attributes: &[(&str, String)], arrays: &[Array]) -> Result<(), Stop> {
-    let bytes = encode(attributes, arrays)
+pub fn write(path: &Path, attributes: &[(&str, String)], arrays: &[Array<'_>]) -> Result<(), Stop> {
+    let encoded = encode(attributes, arrays)
         .map_err(|error| Stop::new(format!("cannot write {}: {error}", path.display())))?;
-    files::write_atomic(path, &bytes)
+    let options = NcWriteOptions { format: NcWriteFormat::Offset64 };
+    files::write_atomic_with(path, |file| match encoded.write(file, options) {
+        Ok(_) => Ok(()),
+        Err(netcdf_writer::Error::Io(error)) => Err(error),
+        Err(error) => Err(io::Error::other(error)),
+    })
 }
 
 fn encode(
     attributes: &[(&str, String)],
-    arrays: &[Array],
-) -> Result<Vec<u8>, netcdf_writer::Error> {
+    arrays: &[Array<'_>],
+) -> Result<NcFileBuilder, netcdf_writer::Error> {
     let mut builder = NcFileBuilder::new();
     for (name, value) in attributes {
         builder.add_attribute(*name, NcAttrValue::Chars(value.clone()))?;
@@ -72,28 +84,38 @@ fn encode(
         }
         builder.write_variable(variable, &array.values)?;
     }
-    let options = NcWriteOptions { format: NcWriteFormat::Offset64 };
-    Ok(builder.to_vec(options)?.1)
+    Ok(builder)
 }
 
 /// Reads one array of a file that [`fn@write`] wrote.
-pub fn read(path: &Path, name: &str) -> Result<Array, Stop> {
+pub fn read(path: &Path, name: &str) -> Result<Array<'static>, Stop> {
     let missing = || failed(path, &format!("no variable `{name}`"));
     read_some(path, name)?.ok_or_else(missing)
 }
 
 /// Reads the array with this name; `None` if the file has none.
-pub fn read_some(path: &Path, name: &str) -> Result<Option<Array>, Stop> {
+pub fn read_some(path: &Path, name: &str) -> Result<Option<Array<'static>>, Stop> {
     let fail = |error: String| failed(path, &error);
     let file = NcFile::open(path).map_err(|error| fail(error.to_string()))?;
     let variables = file.variables().map_err(|error| fail(error.to_string()))?;
     let Some(variable) = variables.iter().find(|v| v.name() == name) else { return Ok(None) };
     let dimensions: Vec<(String, usize)> =
         variable.dimensions().iter().map(|d| (d.name.clone(), d.size as usize)).collect();
-    let values = file.read_variable_as_f64(name).map_err(|error| fail(error.to_string()))?;
-    let values = values.iter().copied().collect();
+    let values = numbers(&file, variable).map_err(|error| fail(error.to_string()))?;
     let unit = variable.attribute("units").and_then(|attribute| attribute.value.as_string());
     Ok(Some(Array { name: name.to_owned(), dimensions, values, unit }))
+}
+
+/// The numbers of a variable; those of double precision are read in place.
+fn numbers(file: &NcFile, variable: &NcVariable) -> netcdf_reader::Result<Cow<'static, [f64]>> {
+    let name = variable.name();
+    if *variable.dtype() != NcType::Double || file.as_classic().is_none() {
+        return Ok(file.read_variable_as_f64(name)?.iter().copied().collect::<Vec<f64>>().into());
+    }
+    let count = variable.dimensions().iter().map(|d| d.size as usize).product();
+    let mut values = vec![0.0; count];
+    file.read_variable_into(name, &mut values)?;
+    Ok(values.into())
 }
 
 fn failed(path: &Path, error: &str) -> Stop {
@@ -120,7 +142,7 @@ pub fn write_response(
             arrays.push(Array {
                 name: axis.name.clone(),
                 dimensions: vec![(axis.name.clone(), values.len())],
-                values: values.clone(),
+                values: values.into(),
                 unit: Some(unit.to_string()),
             });
         }
@@ -128,7 +150,7 @@ pub fn write_response(
     arrays.push(Array {
         name: layout.name.clone(),
         dimensions: layout.axes.iter().map(|a| (a.name.clone(), a.len())).collect(),
-        values: response.values.clone(),
+        values: (&response.values).into(),
         unit: Some(layout.unit.to_string()),
     });
     let file = format!("{run}.nc");

@@ -128,6 +128,16 @@ impl Matrix {
         Self::from_fn(self.rows, indices.len(), |i, j| self[(i, indices[j])])
     }
 
+    /// The entries in some rows and columns, in the given order.
+    pub fn select(&self, rows: &[usize], columns: &[usize]) -> Self {
+        Self::from_fn(rows.len(), columns.len(), |i, j| self[(rows[i], columns[j])])
+    }
+
+    /// Allocates memory for further rows at once.
+    pub fn reserve_rows(&mut self, count: usize) {
+        self.data.reserve_exact(count * self.columns);
+    }
+
     /// Removes all rows and sets the number of columns; the allocated memory is kept.
     pub fn clear(&mut self, columns: usize) {
         self.data.clear();

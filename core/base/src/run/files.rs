@@ -1,7 +1,7 @@
 //! Files that are written either completely or not at all.
 
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, BufWriter, IntoInnerError, Read, Write};
 use std::path::Path;
 
 use serde::Serialize;
@@ -16,14 +16,23 @@ use super::Stop;
 /// # Errors
 /// If the file cannot be written; the temporary file is removed.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), Stop> {
+    write_atomic_with(path, |file| file.write_all(bytes))
+}
+
+/// Like [`write_atomic`], with a file that `write` fills: for contents that need not be in memory as a whole.
+pub fn write_atomic_with(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), Stop> {
     let write = || -> io::Result<()> {
         let folder = path.parent().unwrap_or(Path::new("."));
         fs::create_dir_all(folder)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let temporary = folder.join(format!(".{name}.part"));
-        let result = File::create(&temporary).and_then(|mut file| {
-            file.write_all(bytes)?;
-            file.sync_all()
+        let result = File::create(&temporary).and_then(|file| {
+            let mut file = BufWriter::new(file);
+            write(&mut file)?;
+            file.into_inner().map_err(IntoInnerError::into_error)?.sync_all()
         });
         if let Err(error) = result {
             // The incomplete file is removed on a best-effort basis; the error worth reporting is the first one.

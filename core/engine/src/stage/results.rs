@@ -33,6 +33,7 @@ pub fn with_failed(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
     let (mut runs, mut valid, mut failed) = (Vec::new(), Vec::new(), Vec::new());
     let mut points = Matrix::zeros(0, parameters.len());
     let mut responses = Matrix::zeros(0, source.layout.len());
+    responses.reserve_rows(records.iter().filter(|record| record.file.is_some()).count());
     for (record, point) in records.iter().zip(simulated.iter_rows()) {
         match &record.file {
             Some(file) => {
@@ -82,11 +83,11 @@ pub fn are_own(source: &EnsembleSource<'_>) -> bool {
 }
 
 /// Converts the values of a file from the model's unit to the study's.
-fn in_unit(stored: Array, wanted: &Unit, file: &str) -> Result<Vec<f64>, Stop> {
-    let Some(text) = &stored.unit else { return Ok(stored.values) };
+fn in_unit(stored: Array<'_>, wanted: &Unit, file: &str) -> Result<Vec<f64>, Stop> {
+    let Some(text) = &stored.unit else { return Ok(stored.into_values()) };
     let unit = Unit::parse(text).map_err(|error| Stop::new(format!("{file}: {error}")))?;
     let factor = unit.factor_to(wanted).ok_or_else(|| {
         Stop::new(format!("{file} holds values in `{unit}`, which do not convert to `{wanted}`"))
     })?;
-    Ok(stored.values.into_iter().map(|value| value * factor).collect())
+    Ok(stored.values.iter().map(|value| value * factor).collect())
 }

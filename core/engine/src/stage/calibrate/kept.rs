@@ -22,21 +22,18 @@ impl Artifact for Calibrated {
             let both = [("chain".to_owned(), d.chains), ("step".to_owned(), d.steps)];
             both.into_iter().chain(last.map(|n| ("coordinate".to_owned(), n))).collect()
         };
-        let array = |name: &str, values: &[f64], last| Array {
-            name: name.to_owned(),
-            dimensions: axes(last),
-            values: values.to_vec(),
-            unit: None,
-        };
+        fn array<'a>(name: &str, values: &'a [f64], dimensions: Vec<(String, usize)>) -> Array<'a> {
+            Array { name: name.to_owned(), dimensions, values: values.into(), unit: None }
+        }
         let mut arrays = vec![
-            array("draws", &d.values, Some(d.dimension())),
-            array("log_density", &d.log_density, None),
+            array("draws", &d.values, axes(Some(d.dimension()))),
+            array("log_density", &d.log_density, axes(None)),
         ];
         let count = self.statistics.names.len();
         for (i, (name, _)) in self.statistics.names.iter().enumerate() {
             let all = self.statistics.values.len() / count;
             let own = &self.statistics.values[i * all..(i + 1) * all];
-            arrays.push(array(&told(name), own, None));
+            arrays.push(array(&told(name), own, axes(None)));
         }
         let names = d.names.join(" ");
         arrays::write(&folder.join("draws.nc"), &[("coordinates", names)], &arrays)?;
@@ -54,13 +51,13 @@ impl Artifact for Calibrated {
             names: outcome.coordinates.iter().map(|c| c.name.clone()).collect(),
             chains: values.dimensions[0].1,
             steps: values.dimensions[1].1,
-            values: values.values,
-            log_density: log_density.values,
+            values: values.into_values(),
+            log_density: log_density.into_values(),
         };
         let names: Vec<(String, Kind)> = files::read_json(&folder.join("statistics.json"))?;
         let mut told_values = Vec::new();
         for (name, _) in &names {
-            told_values.extend(arrays::read(&path, &told(name))?.values);
+            told_values.extend(arrays::read(&path, &told(name))?.into_values());
         }
         let (chains, steps) = (draws.chains, draws.steps);
         let statistics = Statistics { names, chains, steps, values: told_values };

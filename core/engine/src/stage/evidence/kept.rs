@@ -69,11 +69,11 @@ impl Artifact for Weighed {
 }
 
 /// Arrays with one value per datum or curve; includes the curve of each datum if it is known.
-fn columns(loo: &LeaveOneOut, prefix: &str, dimension: &str) -> Vec<Array> {
+fn columns(loo: &LeaveOneOut, prefix: &str, dimension: &str) -> Vec<Array<'static>> {
     let array = |name: &str, dimension: &str, values: Vec<f64>| Array {
         name: format!("{prefix}{name}"),
         dimensions: vec![(dimension.to_owned(), values.len())],
-        values,
+        values: values.into(),
         unit: None,
     };
     let column = |name, value: fn(&Left) -> f64| {
@@ -93,7 +93,7 @@ fn columns(loo: &LeaveOneOut, prefix: &str, dimension: &str) -> Vec<Array> {
 
 fn read(path: &Path, prefix: &str) -> Result<LeaveOneOut, Stop> {
     let column =
-        |name: &str| arrays::read(path, &format!("{prefix}{name}")).map(|array| array.values);
+        |name: &str| arrays::read(path, &format!("{prefix}{name}")).map(Array::into_values);
     let (elpd, with_it, k_hat) = (column("elpd")?, column("with_it")?, column("k_hat")?);
     let each = elpd.into_iter().zip(with_it).zip(k_hat);
     // Runs of earlier versions have neither limit nor curves.

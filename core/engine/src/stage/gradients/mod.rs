@@ -54,7 +54,7 @@ impl Artifact for Gradients {
         let slopes = Array {
             name: "gradients".to_owned(),
             dimensions: dimensions.map(|(name, size)| (name.to_owned(), size)).into(),
-            values: self.slopes.as_slice().to_vec(),
+            values: self.slopes.as_slice().into(),
             unit: None,
         };
         let points = Array::matrix("points", "run", "parameter", &self.points);

@@ -76,7 +76,7 @@ impl Artifact for Quantified {
             _ => None,
         };
         let (draws, map) = if asked {
-            (arrays::read(&path, "draws")?.into_matrix(), arrays::read(&path, "map")?.values)
+            (arrays::read(&path, "draws")?.into_matrix(), arrays::read(&path, "map")?.into_values())
         } else {
             (Matrix::zeros(0, about.steps.len()), Vec::new())
         };
@@ -84,17 +84,17 @@ impl Artifact for Quantified {
     }
 }
 
-fn vector(name: &str, dimension: &str, values: &[f64]) -> Array {
+fn vector<'a>(name: &str, dimension: &str, values: &'a [f64]) -> Array<'a> {
     Array {
         name: name.to_owned(),
         dimensions: vec![(dimension.to_owned(), values.len())],
-        values: values.to_vec(),
+        values: values.into(),
         unit: None,
     }
 }
 
 /// All arrays of `sensitivity.nc`.
-fn all(found: &Propagated) -> Vec<Array> {
+fn all(found: &Propagated) -> Vec<Array<'_>> {
     let mut all = Vec::new();
     let varies = !found.inputs.is_empty();
     if found.quantities.first.rows() > 0 {
@@ -130,7 +130,7 @@ fn propagated(
             shapley_error: one(5)?,
         })
     };
-    let band = |k: usize| arrays::read(path, BANDS[k]).map(|array| array.values);
+    let band = |k: usize| arrays::read(path, BANDS[k]).map(Array::into_values);
     let bands =
         Bands { mean: band(0)?, sd: band(1)?, q025: band(2)?, median: band(3)?, q975: band(4)? };
     let none = || Indices::none(inputs.len());
