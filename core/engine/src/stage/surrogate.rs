@@ -2,6 +2,8 @@
 
 mod fitted;
 
+use std::borrow::Cow;
+
 use lacuna::data::{Ensemble, Parameter};
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Emulator, Fact, Surrogate};
@@ -20,6 +22,10 @@ use super::{low_fidelity, stream};
 use crate::screening::{ActiveSubspace, active_subspace};
 use crate::study::Study;
 use crate::study::file::InvalidRuns;
+
+/// Largest number of training runs whose error curves are kept, evenly spaced: their covariance is then known to one
+/// percent.
+const MOST_CURVES: usize = 5000;
 
 /// Input of a fit, and the folder in which it is kept.
 pub struct Fitting<'a> {
@@ -194,14 +200,15 @@ fn fit(fit: Fit<'_>, observer: &dyn Observer) -> Result<Fitted, Stop> {
     let Fit { study, data, fitting, .. } = fit;
     let ensemble = data.runs()?;
     let points = ensemble.points.select_rows(&fitting.training);
-    let responses = ensemble.responses.select_rows(&fitting.training);
+    let responses = rows_of(&ensemble.responses, &fitting.training);
     let rows: Vec<usize> = (0..points.rows()).collect();
     let emulator = fit.emulator(&points, &responses, &rows, &[], observer)?;
     let test_points = ensemble.points.select_rows(&fitting.validation);
     let simulated = ensemble.responses.select_rows(&fitting.validation);
     let emulated = emulator.mean(&test_points);
     let held_out = difference(&simulated, &emulated);
-    let left_out = corrected(&*emulator, &responses);
+    let shown = emulator_error::thinned(points.rows(), MOST_CURVES);
+    let left_out = corrected(&*emulator, &responses, &shown);
     let judged = if held_out.rows() > 0 { &held_out } else { &left_out };
     let loo_by_output = emulator.fit_error().relative.clone();
     let mut errors = Errors {
@@ -230,8 +237,9 @@ fn fit(fit: Fit<'_>, observer: &dyn Observer) -> Result<Fitted, Stop> {
         errors.facts.push(Fact::new("errors at runs left out", why));
         None
     });
+    let shown_points = points.select_rows(&shown);
     let curves = refitted.unwrap_or_else(|| Curves {
-        points: points.clone(),
+        points: shown_points.clone(),
         errors: left_out.clone(),
         stated: None,
     });
@@ -239,7 +247,7 @@ fn fit(fit: Fit<'_>, observer: &dyn Observer) -> Result<Fitted, Stop> {
     let validated = Curves { points: test_points.clone(), errors: held_out.clone(), stated };
     let curves = curves.with(validated);
     let samples = stacked(&left_out, &held_out);
-    let sample_points = stacked(&points, &test_points);
+    let sample_points = stacked(&shown_points, &test_points);
     let active = fit.active(&responses);
     Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points, curves, active })
 }
@@ -284,7 +292,7 @@ impl Fit<'_> {
             parameters: &used.parameters(fitting.parameters),
             layouts: &study.layouts,
             points: &used.points(&points.select_rows(kept)),
-            responses: &responses.select_rows(kept),
+            responses: &rows_of(responses, kept),
             gradients: gradients.as_ref(),
         };
         let progress = Progress::new(observer);
@@ -313,8 +321,18 @@ fn inflation(emulator: &dyn Emulator, points: &Matrix, errors: &Matrix) -> Optio
     ratio.is_finite().then_some(ratio)
 }
 
-/// Leave-one-out residuals, scaled so that their mean square is the (corrected) leave-one-out error.
-fn corrected(emulator: &dyn Emulator, responses: &Matrix) -> Matrix {
+/// Rows of a matrix; nothing is copied if these are all rows in their order.
+fn rows_of<'a>(matrix: &'a Matrix, rows: &[usize]) -> Cow<'a, Matrix> {
+    if rows.iter().copied().eq(0..matrix.rows()) {
+        Cow::Borrowed(matrix)
+    } else {
+        Cow::Owned(matrix.select_rows(rows))
+    }
+}
+
+/// Leave-one-out residuals of some training runs, scaled so that their mean square over all runs is the (corrected)
+/// leave-one-out error.
+fn corrected(emulator: &dyn Emulator, responses: &Matrix, runs: &[usize]) -> Matrix {
     let error = emulator.fit_error();
     let scale: Vec<f64> = (0..responses.columns())
         .map(|j| {
@@ -328,7 +346,7 @@ fn corrected(emulator: &dyn Emulator, responses: &Matrix) -> Matrix {
         })
         .collect();
     let residuals = &error.residuals;
-    Matrix::from_fn(residuals.rows(), residuals.columns(), |i, j| residuals[(i, j)] * scale[j])
+    Matrix::from_fn(runs.len(), scale.len(), |i, j| residuals[(runs[i], j)] * scale[j])
 }
 
 fn by_group(study: &Study, errors: &Matrix, loo: &[f64]) -> Vec<(String, f64, f64, f64)> {

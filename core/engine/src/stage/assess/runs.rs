@@ -2,6 +2,7 @@
 
 use lacuna::data::{Ensemble, Parameter};
 use lacuna::math::moments;
+use lacuna::plugin::Emulator;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
@@ -44,10 +45,11 @@ pub(super) fn findings(
     Ok(found)
 }
 
-/// Parameters of the training runs, `runs x parameters`.
+/// Parameters of the training runs, `runs x parameters`; of thousands of runs evenly spaced ones.
 fn training(problem: &InverseProblem<'_>) -> Option<Matrix> {
     let fitted = &problem.fitted()?.value;
-    Some(fitted.sample_points.select_rows(&(0..fitted.errors.training).collect::<Vec<_>>()))
+    let count = fitted.sample_points.rows() - fitted.errors.validation;
+    Some(fitted.sample_points.select_rows(&(0..count).collect::<Vec<_>>()))
 }
 
 fn few(
@@ -65,8 +67,9 @@ fn few(
     let inside = |point: &&[f64]| {
         own.iter().all(|&j| intervals[j].0 <= point[j] && point[j] <= intervals[j].1)
     };
-    let inside = points.iter_rows().filter(inside).count();
-    check::few_in_prior(inside, points.rows(), own.len(), shift)
+    let all = problem.fitted()?.value.errors.training;
+    let inside = points.iter_rows().filter(inside).count() * all / points.rows().max(1);
+    check::few_in_prior(inside, all, own.len(), shift)
 }
 
 /// Finding about the distance of the posterior mean from its (d + 1)-th nearest training run, for d parameters,
@@ -229,14 +232,14 @@ fn suspicious(
     };
     let step = (rows.len() * outputs.len()).div_ceil(MOST).max(1);
     let columns: Vec<usize> = outputs.into_iter().step_by(step).collect();
-    let responses = ensemble.responses.select_rows(&rows).select_columns(&columns);
+    let responses = ensemble.responses.select(&rows, &columns);
     let raw = ensemble.points.select_rows(&rows);
     let scale = Scale::of(study, &raw);
     let points =
         Matrix::from_fn(raw.rows(), own.len(), |i, k| scale.unit(own[k], raw[(i, own[k])]));
     let left_out = (!follows).then(|| {
         let own: Vec<usize> = (0..rows.len()).collect();
-        left_out(&fitted.value, &own, &columns)
+        left_out(&fitted.value, problem.emulator(), &own, &columns)
     });
     let suspects = suspicious::suspects(&points, &responses, left_out.as_ref());
     let told = |suspect: &Suspect| {
@@ -265,13 +268,22 @@ fn suspicious(
 
 /// Leave-one-out errors of the emulator at its training runs: from a fit without the run if the emulator states how
 /// large they may be.
-fn left_out(fitted: &Fitted, runs: &[usize], outputs: &[usize]) -> LeftOut {
-    let Some(stated) = &fitted.curves.stated else {
-        let errors = fitted.samples.select_rows(runs).select_columns(outputs);
+fn left_out(
+    fitted: &Fitted,
+    emulator: Option<&dyn Emulator>,
+    runs: &[usize],
+    outputs: &[usize],
+) -> LeftOut {
+    let known = fitted.sample_points.rows() - fitted.errors.validation;
+    // Of thousands of runs the stage keeps the errors of some, the emulator those of all.
+    let all = emulator.map(|e| &e.fit_error().residuals).filter(|_| known < runs.len());
+    let stated = fitted.curves.stated.as_ref().filter(|_| all.is_none());
+    let Some(stated) = stated else {
+        let errors = all.unwrap_or(&fitted.samples).select(runs, outputs);
         return LeftOut { errors, sizes: vec![1.0; runs.len()] };
     };
-    let errors = fitted.curves.errors.select_rows(runs).select_columns(outputs);
-    let variances = stated.select_rows(runs).select_columns(outputs);
+    let errors = fitted.curves.errors.select(runs, outputs);
+    let variances = stated.select(runs, outputs);
     let of_output = |j: usize| moments::mean(&variances.column(j));
     let means: Vec<f64> = (0..outputs.len()).map(of_output).collect();
     let relative = |row: &[f64]| {

@@ -78,7 +78,7 @@ fn scaled(matrix: &Matrix, factor: f64) -> Matrix {
 }
 
 /// At most `most` of `count` indices, evenly spaced.
-fn thinned(count: usize, most: usize) -> Vec<usize> {
+pub(super) fn thinned(count: usize, most: usize) -> Vec<usize> {
     let kept = count.min(most);
     (0..kept).map(|k| (2 * k + 1) * count / (2 * kept)).collect()
 }
