@@ -31,6 +31,14 @@ pub struct PrincipalComponents {
     pub remainder: Matrix,
 }
 
+/// Number of values (runs times outputs) above which components are computed from the products of the runs.
+const LARGE: usize = 10_000_000;
+/// Singular values relative to the largest that these products resolve: the square root of the rounding error, and a
+/// margin.
+const RESOLVED: f64 = 1e-7;
+/// Number of runs whose kept part is in memory at a time.
+const BLOCK: usize = 64;
+
 impl Components {
     /// Returns a description of what is wrong with the choice, if anything.
     pub fn fault(&self) -> Option<String> {
@@ -52,14 +60,43 @@ impl Components {
         if *self == Self::None {
             return Ok(PrincipalComponents::of_outputs(mean, &centred));
         }
-        let svd = lacuna_linalg::thin_svd(&centred)
-            .map_err(|e| Stop::new(format!("the principal components of the outputs: {e}")))?;
+        let failed = |e| Stop::new(format!("the principal components of the outputs: {e}"));
+        if outputs > runs && runs * outputs > LARGE && !self.needs_all_digits() {
+            return self.by_runs(mean, centred).map_err(failed);
+        }
+        let svd = lacuna_linalg::thin_svd(&centred).map_err(failed)?;
         let rank = self.rank(&svd.values);
         let scores = Matrix::from_fn(runs, rank, |i, k| svd.u[(i, k)] * svd.values[k]);
         let directions = Matrix::from_fn(outputs, rank, |j, k| svd.v[(j, k)]);
-        let kept = lacuna_linalg::multiply_transposed(&scores, &directions);
-        let remainder = Matrix::from_fn(runs, outputs, |i, j| centred[(i, j)] - kept[(i, j)]);
-        Ok(PrincipalComponents { mean, directions, scores, remainder })
+        Ok(PrincipalComponents { mean, directions, scores, remainder: centred }.with_remainder())
+    }
+
+    /// Returns true if components are wanted that the eigenvalues of products do not resolve.
+    fn needs_all_digits(&self) -> bool {
+        matches!(self, Self::Variance(share) if *share > 1.0 - 1e-12)
+    }
+
+    /// Computes the components from the products of the runs with each other, `C C'`, whose eigenvectors are the left
+    /// singular vectors: for many more outputs than runs, with memory for one matrix of the size of the directions.
+    /// Components below [`RESOLVED`] of the largest are left to the remainder.
+    fn by_runs(
+        &self,
+        mean: Vec<f64>,
+        centred: Matrix,
+    ) -> Result<PrincipalComponents, lacuna_linalg::Error> {
+        let runs = centred.rows();
+        let products = lacuna_linalg::multiply_transposed(&centred, &centred);
+        let eigen = lacuna_linalg::symmetric_eigen(&products)?;
+        let mut values: Vec<f64> = eigen.values.iter().rev().map(|v| v.max(0.0).sqrt()).collect();
+        let largest = values.first().copied().unwrap_or(0.0);
+        values.retain(|s| *s > RESOLVED * largest);
+        let rank = self.rank(&values);
+        // The eigenvalues are in increasing order.
+        let scores =
+            Matrix::from_fn(runs, rank, |i, k| eigen.vectors[(i, runs - 1 - k)] * values[k]);
+        let scaled = Matrix::from_fn(runs, rank, |i, k| scores[(i, k)] / (values[k] * values[k]));
+        let directions = lacuna_linalg::transposed_multiply(&centred, &scaled);
+        Ok(PrincipalComponents { mean, directions, scores, remainder: centred }.with_remainder())
     }
 
     fn rank(&self, singular_values: &[f64]) -> usize {
@@ -100,6 +137,45 @@ impl PrincipalComponents {
             }
         }
         Self { mean, directions, scores, remainder }
+    }
+
+    /// Returns the first components alone; the others become part of the remainder.
+    pub fn first(self, count: usize) -> Self {
+        let kept: Vec<usize> = (0..count).collect();
+        let left: Vec<usize> = (count..self.scores.columns()).collect();
+        let Self { mean, directions, scores, mut remainder } = self;
+        let others = lacuna_linalg::multiply_transposed(
+            &scores.select_columns(&left),
+            &directions.select_columns(&left),
+        );
+        remainder.as_mut_slice().iter_mut().zip(others.as_slice()).for_each(|(e, o)| *e += o);
+        let (directions, scores) = (directions.select_columns(&kept), scores.select_columns(&kept));
+        Self { mean, directions, scores, remainder }
+    }
+
+    /// Returns the same mean and directions with the scores and the remainder of other runs.
+    pub fn of_all(self, responses: &Matrix) -> Self {
+        let Self { mean, directions, .. } = self;
+        let mut centred = responses.clone();
+        for i in 0..centred.rows() {
+            centred.row_mut(i).iter_mut().zip(&mean).for_each(|(y, m)| *y -= m);
+        }
+        let scores = lacuna_linalg::multiply(&centred, &directions);
+        Self { mean, directions, scores, remainder: centred }.with_remainder()
+    }
+
+    /// Takes the components out of the centred responses, which are in place of the remainder.
+    fn with_remainder(mut self) -> Self {
+        let runs = self.scores.rows();
+        for first in (0..runs).step_by(BLOCK) {
+            let rows: Vec<usize> = (first..runs.min(first + BLOCK)).collect();
+            let scores = self.scores.select_rows(&rows);
+            let kept = lacuna_linalg::multiply_transposed(&scores, &self.directions);
+            for (&i, kept) in rows.iter().zip(kept.iter_rows()) {
+                self.remainder.row_mut(i).iter_mut().zip(kept).for_each(|(e, k)| *e -= k);
+            }
+        }
+        self
     }
 
     /// Returns for each output the mean square over the runs of the part that the components leave out.

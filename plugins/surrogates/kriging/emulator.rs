@@ -99,10 +99,7 @@ impl Kriging {
         if d == 0 || names.len() != d || total != Some(numbers.len()) {
             return Err(damaged());
         }
-        let mut parts = shapes.iter().map(|&(m, n)| {
-            let rest = numbers.split_off(m * n);
-            Matrix::from_vec(m, n, std::mem::replace(&mut numbers, rest))
-        });
+        let mut parts = shapes.iter().map(|&(m, n)| Matrix::from_vec(m, n, numbers.next(m * n)));
         let mut part = || parts.next().ok_or_else(damaged);
         let (points, scores, loadings) = (part()?, part()?, part()?);
         let (truncation, relative) = (part()?.into_vec(), part()?.into_vec());

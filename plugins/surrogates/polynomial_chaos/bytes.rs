@@ -12,7 +12,7 @@ pub(super) fn write(header: &impl Serialize, numbers: &[&[f64]]) -> Result<Vec<u
 }
 
 /// Like [`read_as`], for this plugin.
-pub(super) fn read<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Vec<f64>), Stop> {
+pub(super) fn read<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Numbers<'_>), Stop> {
     read_as(NAME, bytes)
 }
 
@@ -37,16 +37,36 @@ pub(in crate::surrogates) fn write_as(
     let mut bytes = magic(plugin);
     bytes.extend((header.len() as u64).to_le_bytes());
     bytes.extend(header);
-    bytes.extend(numbers.iter().copied().flatten().flat_map(|x| x.to_le_bytes()));
+    bytes.reserve_exact(8 * numbers.iter().map(|part| part.len()).sum::<usize>());
+    for x in numbers.iter().copied().flatten() {
+        bytes.extend_from_slice(&x.to_le_bytes());
+    }
     Ok(bytes)
+}
+
+/// Numbers of a file that are still to be read.
+pub(in crate::surrogates) struct Numbers<'a>(&'a [[u8; 8]]);
+
+impl Numbers<'_> {
+    /// Returns how many there are.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Returns the next numbers; fewer if there are no more.
+    pub fn next(&mut self, count: usize) -> Vec<f64> {
+        let (next, rest) = self.0.split_at(count.min(self.0.len()));
+        self.0 = rest;
+        next.iter().map(|x| f64::from_le_bytes(*x)).collect()
+    }
 }
 
 /// Reads the header and the numbers of a file that [`write_as`] wrote; fails if it is damaged or from another
 /// version.
-pub(in crate::surrogates) fn read_as<H: DeserializeOwned>(
+pub(in crate::surrogates) fn read_as<'a, H: DeserializeOwned>(
     plugin: &str,
-    bytes: &[u8],
-) -> Result<(H, Vec<f64>), Stop> {
+    bytes: &'a [u8],
+) -> Result<(H, Numbers<'a>), Stop> {
     let damaged = || damaged_as(plugin);
     let rest = bytes.strip_prefix(&magic(plugin)[..]).ok_or_else(|| {
         Stop::new(format!(
@@ -62,7 +82,7 @@ pub(in crate::surrogates) fn read_as<H: DeserializeOwned>(
     if !tail.is_empty() {
         return Err(damaged());
     }
-    Ok((header, numbers.iter().map(|x| f64::from_le_bytes(*x)).collect()))
+    Ok((header, Numbers(numbers)))
 }
 
 /// Returns the error for a damaged file.

@@ -51,6 +51,18 @@ pub struct Summary {
     pub optimistic: usize,
     /// Principal components, if they were fitted in place of the outputs.
     pub reduction: Option<Reduction>,
+    /// Number of runs on which the terms were chosen, if these are not all, and whether all outputs were then fitted
+    /// with the terms of all.
+    pub part: Option<Part>,
+}
+
+/// Choice of the terms on a part of the runs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// Number of these runs.
+    pub runs: usize,
+    /// Whether each output has the terms of all outputs together.
+    pub common: bool,
 }
 
 /// Reduction of the outputs to principal components.
@@ -122,8 +134,9 @@ impl Expansion {
         if !whole || numbers.len() != (terms + 1 + runs) * outputs {
             return Err(bytes::damaged());
         }
-        let residuals = numbers.split_off((terms + 1) * outputs);
-        let relative = numbers.split_off(terms * outputs);
+        let coefficients = Matrix::from_vec(terms, outputs, numbers.next(terms * outputs));
+        let relative = numbers.next(outputs);
+        let residuals = Matrix::from_vec(runs, outputs, numbers.next(runs * outputs));
         let mut degrees = header.exponents.iter().enumerate();
         if !degrees.all(|(k, &e)| header.coordinates[k % dimension].reaches(usize::from(e))) {
             return Err(bytes::damaged());
@@ -131,8 +144,8 @@ impl Expansion {
         let terms_of = Terms::from_exponents(dimension, header.exponents);
         Ok(Self::new(
             Basis::new(header.coordinates, terms_of),
-            Matrix::from_vec(terms, outputs, numbers),
-            FitError { relative, residuals: Matrix::from_vec(runs, outputs, residuals) },
+            coefficients,
+            FitError { relative, residuals },
             header.summary,
         ))
     }
@@ -244,6 +257,10 @@ impl Summary {
         if let Some(Reduction { components, left_out }) = self.reduction {
             tell("principal components", components.to_string());
             tell("share of the variance that they leave out", format!("{left_out:.2e}"));
+        }
+        if let Some(Part { runs, common }) = self.part {
+            let of = if common { "; each output has the terms of all" } else { "" };
+            tell("runs on which the terms were chosen", format!("{runs}{of}"));
         }
         if self.constant > 0 {
             tell("outputs that do not vary over the runs", self.constant.to_string());

@@ -2,39 +2,25 @@
 
 use lacuna::math::random::Stream;
 use lacuna::plugin::Emulator;
-use lacuna::plugin::surrogate::{FitError, Training};
+use lacuna::plugin::surrogate::Training;
 use lacuna::run::{Progress, Stop};
-use lacuna_linalg::{Matrix, multiply_transposed};
+use lacuna_linalg::Matrix;
 
 use super::PolynomialChaos;
 use super::coordinate::Coordinate;
-use super::emulator::{Expansion, Reduction, Summary};
+use super::emulator::{Expansion, Summary};
+use super::fits::Fits;
 use super::judge::Criterion;
 use super::least_squares::Fit;
 use super::options::Solver;
+use super::output::{Output, moments, outputs};
 use super::quadrature::Projection;
-use super::search::{Best, Output, Search};
+use super::search::{Best, Search};
 use super::slopes::{self, Slopes};
 use super::terms::{Basis, Sets};
-use crate::surrogates::principal_components::PrincipalComponents;
-
-/// Standard deviation over the runs, as a fraction of the largest response, below which an output counts as constant:
-/// what is left are rounding errors (such as the strain of a sensor before the wave arrives).
-const ROUND_OFF: f64 = 1e-13;
 
 /// Largest degree that is low enough for a warning if the number of terms allows no higher one.
 const LOW_DEGREE: usize = 3;
-
-/// Fits of all outputs, or of all components, side by side.
-struct Fits {
-    terms: Basis,
-    /// Coefficients (`terms x outputs`).
-    coefficients: Matrix,
-    relative: Vec<f64>,
-    /// Leave-one-out residuals (`runs x outputs`).
-    residuals: Matrix,
-    summary: Summary,
-}
 
 pub(super) fn fit(
     options: &PolynomialChaos,
@@ -70,17 +56,9 @@ pub(super) fn fit(
         },
     };
     problem.check_level()?;
-    let outputs = problem.outputs(training.responses, training.gradients);
-    let expansion = match options.components {
-        Some(components) => {
-            let components = components.of(training.responses)?;
-            let of_scores = training
-                .gradients
-                .map(|g| slopes::of_components(g, &components.directions, dimension));
-            let scores = problem.outputs(&components.scores, of_scores.as_ref());
-            problem.fits(&scores, progress)?.multiplied_back(&outputs, &components)
-        }
-        None => problem.fits(&outputs, progress)?.expansion(None),
+    let expansion = match problem.part(stream) {
+        Some(part) => problem.fit_from_part(&part, training.responses, stream, progress)?,
+        None => problem.fit_from_all(training, progress)?,
     };
     problem.warn(&expansion, progress);
     problem.warn_of_limit(&expansion, progress);
@@ -133,30 +111,16 @@ pub(in crate::surrogates) fn check_numbers(training: &Training<'_>) -> Result<()
     Ok(())
 }
 
-fn outputs(responses: &Matrix) -> Vec<Output> {
-    let largest = responses.as_slice().iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-    let runs = responses.rows() as f64;
-    let columns = responses.transposed();
-    let output = |values: &[f64]| {
-        let mean = values.iter().sum::<f64>() / runs;
-        let centred: Vec<f64> = values.iter().map(|y| y - mean).collect();
-        let variance = centred.iter().map(|y| y * y).sum::<f64>() / runs;
-        let varies = variance.sqrt() > ROUND_OFF * largest;
-        Output { mean, centred, variance: if varies { variance } else { 0.0 } }
-    };
-    columns.iter_rows().map(output).collect()
-}
-
 /// Data shared by the fits of all outputs.
-struct Problem<'a> {
-    options: &'a PolynomialChaos,
-    points: &'a Matrix,
-    coordinates: Vec<Coordinate>,
-    sets: Sets,
-    criterion: Criterion,
-    projection: Option<Projection>,
+pub(super) struct Problem<'a> {
+    pub options: &'a PolynomialChaos,
+    pub points: &'a Matrix,
+    pub coordinates: Vec<Coordinate>,
+    pub sets: Sets,
+    pub criterion: Criterion,
+    pub projection: Option<Projection>,
     /// Slopes of the responses at the runs, if they are known.
-    slopes: Option<Slopes>,
+    pub slopes: Option<Slopes>,
 }
 
 impl Problem<'_> {
@@ -232,9 +196,48 @@ impl Problem<'_> {
         }
     }
 
+    fn fit_from_all(
+        &self,
+        training: &Training<'_>,
+        progress: &Progress<'_>,
+    ) -> Result<Expansion, Stop> {
+        let Training { responses, gradients, .. } = *training;
+        let runs = self.points.rows();
+        let Some(reduction) = self.options.reduction(runs, responses) else {
+            let outputs = self.outputs(responses, gradients);
+            return Ok(self.fits(&outputs, progress)?.expansion(None));
+        };
+        let search = self.search();
+        let (components, found, scores) = match gradients {
+            Some(gradients) => {
+                let components = reduction.components(responses)?;
+                let dimension = self.coordinates.len();
+                let slopes = slopes::of_components(gradients, &components.directions, dimension);
+                let scores = self.outputs(&components.scores, Some(&slopes));
+                let found = search.choose_all(&scores, progress)?;
+                (components, found, scores)
+            }
+            None => {
+                let (components, found) = reduction.chosen(responses, &search, progress)?;
+                let scores = outputs(&components.scores);
+                (components, found, scores)
+            }
+        };
+        let (_, variances) = moments(responses);
+        let fits = self.refits(&search, &scores, &found)?;
+        Ok(fits.multiplied_back(&variances, &components))
+    }
+
     /// Returns the best fit of each output.
     fn fits(&self, outputs: &[Output], progress: &Progress<'_>) -> Result<Fits, Stop> {
-        let search = Search {
+        let search = self.search();
+        let found = search.choose_all(outputs, progress)?;
+        self.refits(&search, outputs, &found)
+    }
+
+    /// Returns the search on all runs.
+    pub fn search(&self) -> Search<'_> {
+        Search {
             options: self.options,
             points: self.points,
             coordinates: &self.coordinates,
@@ -242,114 +245,82 @@ impl Problem<'_> {
             criterion: &self.criterion,
             projection: self.projection.as_ref(),
             slopes: self.slopes.as_ref(),
-        };
-        let found = search.run(outputs, progress)?;
-        let unexplained = outputs.iter().zip(&found).any(|(o, b)| o.variance > 0.0 && b.is_none());
-        if unexplained {
-            return Err(unexplained_output());
         }
-        let fits = search.refit(outputs, &found)?;
+    }
+
+    /// Returns the fits on chosen terms.
+    pub fn refits(
+        &self,
+        search: &Search<'_>,
+        outputs: &[Output],
+        found: &[Option<Best>],
+    ) -> Result<Fits, Stop> {
+        let fits = search.refit(outputs, found)?;
         let runs = self.points.rows();
         let fits: Vec<Fit> = outputs
             .iter()
             .zip(fits)
             .map(|(o, fit)| fit.unwrap_or_else(|| constant(o, runs)))
             .collect();
-        Ok(self.assembled(outputs, &found, &fits))
+        Ok(self.assembled(outputs, found, &fits))
     }
 
     /// Assembles the fits over the union of the outputs' terms.
     fn assembled(&self, outputs: &[Output], found: &[Option<Best>], fits: &[Fit]) -> Fits {
-        let all = &self.sets.terms;
-        let terms_of = |best: &Option<Best>| best.as_ref().map_or(vec![0], |b| b.terms.clone());
-        let own: Vec<Vec<usize>> = found.iter().map(terms_of).collect();
-        let mut used = vec![false; all.len()];
-        own.iter().flatten().for_each(|&t| used[t] = true);
-        // The constant is included even without outputs.
-        used[0] = true;
-        let union: Vec<usize> = (0..used.len()).filter(|&t| used[t]).collect();
-        let mut position = vec![0; used.len()];
+        let union = self.union(found);
+        let mut position = vec![0; self.sets.terms.len()];
         union.iter().enumerate().for_each(|(i, &t)| position[t] = i);
         let mut coefficients = Matrix::zeros(union.len(), fits.len());
-        for (o, (fit, terms)) in fits.iter().zip(&own).enumerate() {
-            for (&t, &c) in terms.iter().zip(&fit.coefficients) {
+        for (o, (fit, best)) in fits.iter().zip(found).enumerate() {
+            for (&t, &c) in terms_of(best).iter().zip(&fit.coefficients) {
                 coefficients[(position[t], o)] = c;
             }
         }
+        let relative: Vec<f64> = fits.iter().map(|f| f.relative).collect();
+        let variances: Vec<f64> = outputs.iter().map(|o| o.variance).collect();
+        let summary = self.summary(found, &relative, &variances);
         let runs = self.points.rows();
+        let residuals = Matrix::from_fn(runs, fits.len(), |r, o| fits[o].residuals[r]);
+        Fits { terms: self.basis(&union), coefficients, relative, residuals, summary }
+    }
+
+    /// Returns the terms of any output, in increasing order; the constant is always one of them.
+    pub fn union(&self, found: &[Option<Best>]) -> Vec<usize> {
+        let mut used = vec![false; self.sets.terms.len()];
+        found.iter().flat_map(terms_of).for_each(|&t| used[t] = true);
+        used[0] = true;
+        (0..used.len()).filter(|&t| used[t]).collect()
+    }
+
+    /// Returns the basis functions of some terms.
+    pub fn basis(&self, terms: &[usize]) -> Basis {
+        Basis::new(self.coordinates.clone(), self.sets.terms.select(terms))
+    }
+
+    /// Returns the properties of a fit, given the choice of each output (or component), and error and variance of each
+    /// that was fitted.
+    pub fn summary(&self, found: &[Option<Best>], relative: &[f64], variances: &[f64]) -> Summary {
         let best = || found.iter().flatten();
-        let summary = Summary {
+        Summary {
             solver: self.options.solver,
             selection: self.options.selection,
             rule: self.projection.as_ref().map(|p| format!("{}, level {}", p.rule.name(), p.level)),
             degrees: found.iter().map(|b| b.as_ref().map_or(0, |b| b.degree)).collect(),
             q_norms: best().map(|b| b.q_norm).collect(),
-            terms: own.iter().map(Vec::len).collect(),
-            candidates: all.len(),
-            constant: outputs.iter().filter(|o| o.variance == 0.0).count(),
-            poor: fits.iter().filter(|f| f.relative >= 1.0).count(),
+            terms: found.iter().map(|b| terms_of(b).len()).collect(),
+            candidates: self.sets.terms.len(),
+            constant: variances.iter().filter(|v| **v == 0.0).count(),
+            poor: relative.iter().filter(|e| **e >= 1.0).count(),
             optimistic: best().filter(|b| 3 * b.terms.len() > self.known()).count(),
             reduction: None,
-        };
-        Fits {
-            terms: Basis::new(self.coordinates.clone(), all.select(&union)),
-            coefficients,
-            relative: fits.iter().map(|f| f.relative).collect(),
-            residuals: Matrix::from_fn(runs, fits.len(), |r, o| fits[o].residuals[r]),
-            summary,
+            part: None,
         }
     }
 }
 
-impl Fits {
-    fn expansion(self, reduction: Option<Reduction>) -> Expansion {
-        let fit_error = FitError { relative: self.relative, residuals: self.residuals };
-        let summary = Summary { reduction, ..self.summary };
-        Expansion::new(self.terms, self.coefficients, fit_error, summary)
-    }
-
-    /// Converts an expansion of components to one of the outputs. The part of the outputs that the components leave
-    /// out is included in the residuals, and hence in all statements about the emulator's error.
-    fn multiplied_back(self, outputs: &[Output], components: &PrincipalComponents) -> Expansion {
-        let PrincipalComponents { mean, directions, scores, remainder } = components;
-        let runs = self.residuals.rows();
-        let mut coefficients = multiply_transposed(&self.coefficients, directions);
-        // The constant is the first term of every set.
-        coefficients.row_mut(0).iter_mut().zip(mean).for_each(|(c, m)| *c += m);
-        let square = |column: Vec<f64>| column.iter().map(|x| x * x).sum::<f64>();
-        // The correction for the number of terms differs between components.
-        let corrections: Vec<f64> = (0..scores.columns())
-            .map(|k| {
-                let plain = square(self.residuals.column(k));
-                let corrected = self.relative[k] * square(scores.column(k));
-                if plain > 0.0 { (corrected / plain).sqrt() } else { 1.0 }
-            })
-            .collect();
-        let corrected =
-            Matrix::from_fn(runs, scores.columns(), |i, k| self.residuals[(i, k)] * corrections[k]);
-        let back = |scores: &Matrix| {
-            let product = multiply_transposed(scores, directions);
-            Matrix::from_fn(runs, outputs.len(), |i, j| product[(i, j)] + remainder[(i, j)])
-        };
-        let (residuals, enlarged) = (back(&self.residuals), back(&corrected));
-        let relative: Vec<f64> = (outputs.iter().enumerate())
-            .map(|(o, output)| {
-                let error = square(enlarged.column(o)) / runs as f64;
-                if output.variance > 0.0 { error / output.variance } else { 0.0 }
-            })
-            .collect();
-        let total: f64 = outputs.iter().map(|o| o.variance).sum();
-        let reduction = Reduction {
-            components: scores.columns(),
-            left_out: components.truncation().iter().sum::<f64>() / total.max(f64::MIN_POSITIVE),
-        };
-        let summary = Summary {
-            constant: outputs.iter().filter(|o| o.variance == 0.0).count(),
-            poor: relative.iter().filter(|e| **e >= 1.0).count(),
-            ..self.summary
-        };
-        Fits { coefficients, relative, residuals, summary, ..self }.expansion(Some(reduction))
-    }
+/// Returns the terms of an output, which are the constant alone if none were chosen.
+fn terms_of(best: &Option<Best>) -> &[usize] {
+    best.as_ref().map_or(&[0], |b| &b.terms)
 }
 
 /// Returns the fit of an output that does not vary.
@@ -357,9 +328,4 @@ fn constant(output: &Output, runs: usize) -> Fit {
     let n = runs as f64;
     let residuals = output.centred[..runs].iter().map(|y| y / (1.0 - 1.0 / n)).collect();
     Fit { coefficients: vec![output.mean], relative: 0.0, residuals }
-}
-
-fn unexplained_output() -> Stop {
-    Stop::new("the responses vary over the runs, but no basis function does so with them")
-        .help("check that the runs' parameters and responses belong together")
 }

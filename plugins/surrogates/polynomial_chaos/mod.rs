@@ -5,11 +5,13 @@ mod by_run;
 pub(super) mod bytes;
 mod candidates;
 mod columns;
+mod common_terms;
 mod coordinate;
 mod dictionary;
 mod emulator;
 mod family;
 mod fit;
+mod fits;
 mod gram;
 mod judge;
 mod least_angle;
@@ -17,8 +19,11 @@ mod least_squares;
 mod matching_pursuit;
 mod measure;
 mod options;
+mod output;
+mod part;
 mod quadrature;
 mod recurrence;
+mod reduction;
 mod search;
 mod sensitivity;
 mod slopes;
@@ -109,9 +114,18 @@ pub struct PolynomialChaos {
     pub selection: Selection,
     /// Principal components of the outputs, fitted in place of the outputs: `{ variance = 0.9999 }` for as many as
     /// carry this fraction of the variance, or `{ count = 20 }`. This saves time with thousands of outputs; the part
-    /// that the components leave out is added to the emulator's error. Default: the outputs themselves.
+    /// that the components leave out is added to the emulator's error. `"none"` fits the outputs themselves. Default: the
+    /// outputs themselves up to a million values (runs times outputs), and above with up to 1000 runs of up to 10000
+    /// outputs; otherwise as many components as leave out at most a hundredth of the mean square error of the fits.
     pub components: Option<Components>,
+    /// Number of runs on which sparse solvers choose the terms of each output if there are more; coefficients and
+    /// errors are those of all runs. With ten runs for each term of all outputs together every output is fitted with
+    /// all of these terms. Default: 2000.
+    pub selection_runs: Option<usize>,
 }
+
+/// Number of runs on which terms are chosen, if the study does not say.
+const SELECTION_RUNS: usize = 2000;
 
 /// Highest degree that may be requested.
 const MOST_DEGREES: usize = 1000;
@@ -214,6 +228,10 @@ impl PolynomialChaos {
         }
         if let Some(message) = self.components.as_ref().and_then(Components::fault) {
             add("components", message, "`{ variance = 0.9999 }` is a usual choice");
+        }
+        if let Some(runs) = self.selection_runs.filter(|&runs| runs < 100) {
+            let message = format!("`selection_runs` must be at least 100, not {runs}");
+            add("selection_runs", message, "from 1000 to 10000 runs are usual");
         }
         if let Selection::KFold(folds) = self.selection {
             if folds < 2 {
@@ -327,4 +345,4 @@ impl Surrogate for PolynomialChaos {
     }
 }
 
-lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"], revision = 2);
+lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"], revision = 3);

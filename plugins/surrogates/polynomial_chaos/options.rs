@@ -139,8 +139,8 @@ pub struct EarlyStop {
     /// Number of consecutive degrees that are worse than the best before the search for an output ends; 0 tries all
     /// degrees. A search that has not yet explained half of the output's variance continues regardless.
     pub degrees: usize,
-    /// Number of consecutive terms (or a tenth of the runs, if larger) without improvement after which the path of
-    /// least-angle regression or matching pursuit ends; 0 follows it to its end.
+    /// Number of consecutive terms (or a tenth of the runs, at most 100, if larger) without improvement after which the
+    /// path of least-angle regression or matching pursuit ends; 0 follows it to its end.
     pub terms: usize,
 }
 
@@ -150,10 +150,14 @@ impl Default for EarlyStop {
     }
 }
 
+/// Largest number of terms without improvement that follows from the number of runs: with thousands of runs the steps
+/// after the best one would take most of the time.
+const LONGEST: usize = 100;
+
 impl EarlyStop {
     /// Returns the number of steps without improvement after which a path ends.
     pub fn window(&self, runs: usize) -> usize {
-        if self.terms == 0 { usize::MAX } else { self.terms.max(runs / 10) }
+        if self.terms == 0 { usize::MAX } else { self.terms.max((runs / 10).min(LONGEST)) }
     }
 }
 

@@ -8,8 +8,8 @@ use super::coordinate::Coordinate;
 use super::family::Family;
 use super::judge::correction;
 use super::least_squares::Fit;
+use super::output::Output;
 use super::recurrence::Recurrence;
-use super::search::Output;
 use crate::designs::quadrature::{Nodes, Rule};
 
 /// Largest distance of a run from its node in standard variables, relative to `1 + |z|`: nodes return from

@@ -17,6 +17,7 @@ use super::least_angle::LeastAngle;
 use super::least_squares::{Fit, Regression};
 use super::matching_pursuit::MatchingPursuit;
 use super::options::Solver;
+use super::output::Output;
 use super::quadrature::Projection;
 use super::slopes::Slopes;
 use super::subspace_pursuit::subspace_pursuit;
@@ -28,15 +29,6 @@ const EXACT: f64 = 1e-26;
 const USELESS: f64 = 0.5;
 /// Number of consecutive norms of one degree that were worse before the next degree is tried.
 const WORSE_NORMS: usize = 2;
-
-/// Values of one output over the runs.
-pub(super) struct Output {
-    pub mean: f64,
-    /// Values minus their mean, followed by the slopes if they are known ([`Slopes`]).
-    pub centred: Vec<f64>,
-    /// Variance with the number of runs as divisor; zero for outputs that do not vary.
-    pub variance: f64,
-}
 
 /// Terms of one output, and how they were found.
 #[derive(Debug, Clone)]
@@ -74,13 +66,25 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Tries one set after the other for all outputs that still improve. `None` for outputs that do not vary, or with
-    /// which no basis function varies.
-    pub fn run(
+    /// Returns the best terms of each output, as [`Self::run`], and fails if there are none for an output that varies.
+    pub fn choose_all(
         &self,
         outputs: &[Output],
         progress: &Progress<'_>,
     ) -> Result<Vec<Option<Best>>, Stop> {
+        let found = self.run(outputs, progress)?;
+        if outputs.iter().zip(&found).any(|(o, best)| o.variance > 0.0 && best.is_none()) {
+            return Err(Stop::new(
+                "the responses vary over the runs, but no basis function does so with them",
+            )
+            .help("check that the runs' parameters and responses belong together"));
+        }
+        Ok(found)
+    }
+
+    /// Tries one set after the other for all outputs that still improve. `None` for outputs that do not vary, or with
+    /// which no basis function varies.
+    fn run(&self, outputs: &[Output], progress: &Progress<'_>) -> Result<Vec<Option<Best>>, Stop> {
         let mut states = vec![State::default(); outputs.len()];
         for (state, output) in states.iter_mut().zip(outputs) {
             state.done = output.variance == 0.0;

@@ -80,3 +80,19 @@ fn outputs_that_do_not_vary_have_no_component() {
     assert_eq!(fit.mean(&points).row(7), [0.0, 1.0, 2.0]);
     assert_eq!(fit.fit_error().relative, [0.0; 3]);
 }
+
+/// With many runs of many outputs components are the default, and what they leave out is less than the error of the fit.
+#[test]
+fn many_runs_of_many_outputs_have_components_by_default() {
+    let of = |n: usize| {
+        let unit = latin_hypercube(n, 2, 5);
+        let responses = Matrix::from_fn(n, 1000, |i, o| response(unit.row(i), o % 40));
+        fitted(&of_degree(3), &BOX, &scaled(&unit, &BOX), &responses).unwrap()
+    };
+    assert!(of(1000).summary().reduction.is_none());
+    let many = of(1001);
+    let reduction = many.summary().reduction.unwrap();
+    assert!(reduction.components <= 64, "{reduction:?}");
+    let error = many.fit_error().relative.iter().sum::<f64>() / 1000.0;
+    assert!(reduction.left_out <= 0.02 * error, "{reduction:?} {error}");
+}

@@ -10,6 +10,7 @@ mod functions;
 mod gradients;
 mod laws;
 mod many_inputs;
+mod many_runs;
 mod options;
 mod solvers;
 mod textbook;
