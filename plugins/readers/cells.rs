@@ -1,5 +1,8 @@
 //! Matching of texts and numbers in a file to values of the response: a sensor's label, a time on the grid.
 
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
 use lacuna::plugin::reader::ReadError;
 
@@ -13,58 +16,85 @@ const CLOSE: f64 = 1e-4;
 /// Relative difference below which two numbers are taken as the same number, computed in two ways.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Returns the index of a number on a numeric axis; `None` if it is not on the grid.
-pub fn on_grid(values: &[f64], x: f64) -> Option<usize> {
-    let after = values.partition_point(|&v| v < x);
-    let candidates = [after.checked_sub(1), Some(after)];
-    let nearest = candidates
-        .into_iter()
-        .flatten()
-        .filter(|&i| i < values.len())
-        .min_by(|&a, &b| (values[a] - x).abs().total_cmp(&(values[b] - x).abs()))?;
-    let distance = (values[nearest] - x).abs();
-    // The smallest spacing is a search over all values, which is skipped if the value matches up to rounding.
-    if distance <= ROUNDING * x.abs() {
-        return Some(nearest);
-    }
-    let spacing = values.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
-    let spacing = if spacing.is_finite() { spacing } else { values[nearest].abs() };
-    (distance <= CLOSE * spacing).then_some(nearest)
+/// Values of an axis by which the cells of a file are found.
+pub struct Places<'a> {
+    axis: &'a Axis,
+    /// Smallest spacing of a grid; computed at the first number that is not exactly one of its values.
+    spacing: OnceCell<f64>,
+    /// Index of each label; made at the first label.
+    labels: OnceCell<BTreeMap<&'a str, usize>>,
 }
 
-/// Returns the index on an axis of a text from a file; `convert` changes its unit. The error describes the mismatch.
-pub fn on_axis(
-    axis: &Axis,
-    text: &str,
-    convert: impl Fn(f64) -> Option<f64>,
-) -> Result<usize, String> {
-    match &axis.coordinates {
-        Coordinates::Labels(labels) => axis.position(text).ok_or_else(|| {
-            format!("unknown {} `{text}`; the response has {}", axis.name, listed(labels))
-        }),
-        Coordinates::Grid { values, unit } => {
-            let x = text.parse().ok().filter(|x: &f64| x.is_finite()).and_then(convert);
-            let x = x.ok_or_else(|| format!("expected a number, found `{text}`"))?;
-            on_grid(values, x).ok_or_else(|| {
-                let (first, last) = (values.first(), values.last());
-                let (first, last) = (first.copied().unwrap_or(0.0), last.copied().unwrap_or(0.0));
-                format!(
-                    "{} {x} {unit} is not on the response's axis of {} values from {first} to {last} {unit}",
-                    axis.name,
-                    values.len()
-                )
-            })
+impl<'a> Places<'a> {
+    /// Prepares the search on an axis.
+    pub fn of(axis: &'a Axis) -> Self {
+        Self { axis, spacing: OnceCell::new(), labels: OnceCell::new() }
+    }
+
+    /// Returns the index on the axis of a text from a file; `convert` changes its unit. The error describes the
+    /// mismatch.
+    pub fn place(&self, text: &str, convert: impl Fn(f64) -> Option<f64>) -> Result<usize, String> {
+        let axis = self.axis;
+        match &axis.coordinates {
+            Coordinates::Labels(labels) => {
+                let known = self.labels.get_or_init(|| {
+                    // The first of equal labels is kept.
+                    labels.iter().enumerate().rev().map(|(i, label)| (&label[..], i)).collect()
+                });
+                known.get(text).copied().ok_or_else(|| {
+                    format!("unknown {} `{text}`; the response has {}", axis.name, listed(labels))
+                })
+            }
+            Coordinates::Grid { values, unit } => {
+                let x = text.parse().ok().filter(|x: &f64| x.is_finite()).and_then(convert);
+                let x = x.ok_or_else(|| format!("expected a number, found `{text}`"))?;
+                self.on_grid(values, x).ok_or_else(|| {
+                    let (first, last) = (values.first(), values.last());
+                    let (first, last) =
+                        (first.copied().unwrap_or(0.0), last.copied().unwrap_or(0.0));
+                    format!(
+                        "{} {x} {unit} is not on the response's axis of {} values from {first} to {last} {unit}",
+                        axis.name,
+                        values.len()
+                    )
+                })
+            }
         }
+    }
+
+    /// Returns the index of a number on a numeric axis; `None` if it is not on the grid.
+    fn on_grid(&self, values: &[f64], x: f64) -> Option<usize> {
+        let after = values.partition_point(|&v| v < x);
+        let candidates = [after.checked_sub(1), Some(after)];
+        let nearest = candidates
+            .into_iter()
+            .flatten()
+            .filter(|&i| i < values.len())
+            .min_by(|&a, &b| (values[a] - x).abs().total_cmp(&(values[b] - x).abs()))?;
+        let distance = (values[nearest] - x).abs();
+        if distance <= ROUNDING * x.abs() {
+            return Some(nearest);
+        }
+        let spacing = *self
+            .spacing
+            .get_or_init(|| values.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min));
+        let spacing = if spacing.is_finite() { spacing } else { values[nearest].abs() };
+        (distance <= CLOSE * spacing).then_some(nearest)
     }
 }
 
 /// Columns of a long table that locate a value, and the column of the value.
 pub struct LongColumns<'a> {
     layout: &'a Layout,
+    places: Vec<Places<'a>>,
     axes: Vec<(usize, Option<Conversion>)>,
     /// Index of the response's column.
     pub value: usize,
     conversion: Conversion,
+}
+
+fn places(layout: &Layout) -> Vec<Places<'_>> {
+    layout.axes.iter().map(Places::of).collect()
 }
 
 impl<'a> LongColumns<'a> {
@@ -74,7 +104,9 @@ impl<'a> LongColumns<'a> {
             .column(&layout.name)
             .and_then(|value| Ok((value, sheet.conversion(value, &layout.unit)?)));
         match (Self::axes(sheet, layout), value) {
-            (Ok(axes), Ok((value, conversion))) => Ok(Self { layout, axes, value, conversion }),
+            (Ok(axes), Ok((value, conversion))) => {
+                Ok(Self { layout, places: places(layout), axes, value, conversion })
+            }
             (axes, value) => Err(ReadError::of_all(axes.err().into_iter().chain(value.err()))
                 .unwrap_or_else(|| ReadError::new(&sheet.path, "cannot be read"))),
         }
@@ -83,7 +115,8 @@ impl<'a> LongColumns<'a> {
     /// Finds only the columns that locate a value; `value` is the column of the value itself.
     pub fn places(sheet: &Sheet, layout: &'a Layout, value: usize) -> Result<Self, ReadError> {
         let conversion = Conversion::none(&layout.unit);
-        Ok(Self { layout, axes: Self::axes(sheet, layout)?, value, conversion })
+        let axes = Self::axes(sheet, layout)?;
+        Ok(Self { layout, places: places(layout), axes, value, conversion })
     }
 
     fn axes(sheet: &Sheet, layout: &Layout) -> Result<Vec<(usize, Option<Conversion>)>, ReadError> {
@@ -115,9 +148,10 @@ impl<'a> LongColumns<'a> {
     /// Returns the flat index of a record's value in the layout.
     pub fn place(&self, sheet: &Sheet, record: &Record) -> Result<usize, ReadError> {
         let mut place = Vec::with_capacity(self.axes.len());
-        for (axis, (column, conversion)) in self.layout.axes.iter().zip(&self.axes) {
+        for (axis, (column, conversion)) in self.places.iter().zip(&self.axes) {
             let convert = |x| conversion.as_ref().map_or(Some(x), |c| c.apply(x));
-            let i = on_axis(axis, &record.cells[*column], convert)
+            let i = axis
+                .place(&record.cells[*column], convert)
                 .map_err(|text| sheet.complain(record, *column, text))?;
             place.push(i);
         }
@@ -149,7 +183,8 @@ pub fn grid_places(
             axis.name
         ));
     }
-    numbers.iter().map(|x| on_axis(axis, &x.to_string(), convert)).collect()
+    let places = Places::of(axis);
+    numbers.iter().map(|x| places.place(&x.to_string(), convert)).collect()
 }
 
 /// Returns the flat index that a heading of a wide table stands for, such as `B 1e-5` or `B:1e-5`.
@@ -171,7 +206,8 @@ pub fn headed_place(layout: &Layout, heading: &str) -> Result<usize, String> {
         let axes: Vec<String> = layout.axes.iter().map(example).collect();
         return Err(format!("expected a heading like `{}`, found `{heading}`", axes.join(" ")));
     }
-    let places = layout.axes.iter().zip(parts).map(|(axis, part)| on_axis(axis, part, Some));
+    let places =
+        layout.axes.iter().zip(parts).map(|(axis, part)| Places::of(axis).place(part, Some));
     Ok(layout.index(&places.collect::<Result<Vec<_>, _>>()?))
 }
 

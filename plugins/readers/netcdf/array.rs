@@ -11,7 +11,7 @@ use lacuna_linalg::Matrix;
 use netcdf_reader::{NcFile, NcOpenOptions, NcType, NcVariable};
 
 use crate::discrepancies::common::squared;
-use crate::readers::cells::{grid_places, on_axis};
+use crate::readers::cells::{Places, grid_places};
 use crate::readers::listed;
 use crate::readers::noise::REPLICATE;
 use crate::readers::sierra::container::read_limit;
@@ -286,11 +286,11 @@ impl File {
     fn places(&self, axis: &Axis, length: usize) -> Result<Vec<usize>, ReadError> {
         let complain = |text: String| self.complain(text).at(format!("dimension `{}`", axis.name));
         let places = match &axis.coordinates {
-            Coordinates::Labels(_) => self
-                .labels(axis)?
-                .iter()
-                .map(|label| on_axis(axis, label, Some))
-                .collect::<Result<Vec<_>, _>>(),
+            Coordinates::Labels(_) => {
+                let places = Places::of(axis);
+                let labels = self.labels(axis)?;
+                labels.iter().map(|label| places.place(label, Some)).collect::<Result<Vec<_>, _>>()
+            }
             Coordinates::Grid { .. } => {
                 let variable = self.variable(&axis.name)?;
                 let unit = self.unit(variable)?;

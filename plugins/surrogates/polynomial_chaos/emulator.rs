@@ -53,6 +53,7 @@ pub struct Summary {
     pub reduction: Option<Reduction>,
     /// Number of runs on which the terms were chosen, if these are not all, and whether all outputs were then fitted
     /// with the terms of all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub part: Option<Part>,
 }
 

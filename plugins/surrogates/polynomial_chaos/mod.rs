@@ -115,7 +115,7 @@ pub struct PolynomialChaos {
     /// Principal components of the outputs, fitted in place of the outputs: `{ variance = 0.9999 }` for as many as
     /// carry this fraction of the variance, or `{ count = 20 }`. This saves time with thousands of outputs; the part
     /// that the components leave out is added to the emulator's error. `"none"` fits the outputs themselves. Default: the
-    /// outputs themselves up to a million values (runs times outputs), and above with up to 1000 runs of up to 10000
+    /// outputs themselves up to a million values (runs times outputs), and above with up to 1000 runs of up to 2000
     /// outputs; otherwise as many components as leave out at most a hundredth of the mean square error of the fits.
     pub components: Option<Components>,
     /// Number of runs on which sparse solvers choose the terms of each output if there are more; coefficients and

@@ -12,7 +12,7 @@ use crate::surrogates::principal_components::{Components, PrincipalComponents};
 /// [`MANY_RUNS`] runs or more than [`MANY_OUTPUTS`] outputs.
 const MANY_VALUES: usize = 1_000_000;
 const MANY_RUNS: usize = 1000;
-const MANY_OUTPUTS: usize = 10_000;
+const MANY_OUTPUTS: usize = 2000;
 /// Fraction of the error of the components' fits that the components left out add at most.
 const ADDED: f64 = 0.01;
 /// Number of components of the first block; each further block doubles the number.

@@ -57,18 +57,19 @@ fn outputs_with_common_terms_are_least_squares() {
     }
 }
 
-/// The loss by the choice on a part is stated by the error itself: against the choice on all runs it is small, and the
-/// relative leave-one-out error agrees with the error at fresh points.
+/// With the default number of runs for the choice the error is at most 5 % larger than with the choice on all runs, and
+/// the relative leave-one-out error agrees with the error at fresh points.
 #[test]
 fn terms_of_a_part_predict_as_well_as_those_of_all_runs() {
     let points = design(4000, 2);
     let data = responses(&points);
-    let of_part = fitted(&chosen_on(500), ISHIGAMI.ranges, &points, &data).unwrap();
+    let of_part = fitted(&up_to(1, 12), ISHIGAMI.ranges, &points, &data).unwrap();
     let of_all = fitted(&chosen_on(4000), ISHIGAMI.ranges, &points, &data).unwrap();
     assert!(of_all.summary().part.is_none());
+    assert_eq!(of_part.summary().part.unwrap().runs, 2000);
     for o in 0..2 {
         let (a, b) = (error(&of_part, o), error(&of_all, o));
-        assert!(a < 1.1 * b, "{o}: {a} {b}");
+        assert!(a < 1.05 * b, "{o}: {a} {b}");
         let values = responses(&design(1000, 99)).column(o);
         let mean = values.iter().sum::<f64>() / 1000.0;
         let variance = values.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / 1000.0;
