@@ -1,7 +1,6 @@
 //! Named arrays in a NetCDF file: the format in which stages store numbers, readable by every netCDF tool.
 
 use std::borrow::Cow;
-use std::io;
 use std::path::Path;
 
 use lacuna::data::{Axis, Coordinates, Layout};
@@ -10,6 +9,8 @@ use lacuna::plugin::model::Response;
 use lacuna::run::{Stop, files};
 use netcdf_reader::{NcFile, NcType, NcVariable};
 use netcdf_writer::{NcAttrValue, NcFileBuilder, NcWriteFormat, NcWriteOptions};
+
+use crate::classic;
 
 /// An array with named dimensions.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,22 +46,25 @@ impl<'a> Array<'a> {
     }
 }
 
+/// Number of values from which on a file is written without the library, which copies them several times.
+const LARGE: usize = 1 << 20;
+
 /// Writes arrays and text attributes as a classic netCDF file with 64-bit offsets.
 pub fn write(path: &Path, attributes: &[(&str, String)], arrays: &[Array<'_>]) -> Result<(), Stop> {
-    let encoded = encode(attributes, arrays)
+    let count: usize = arrays.iter().map(|array| array.values.len()).sum();
+    if count >= LARGE && classic::is_possible(arrays) {
+        return files::write_atomic_with(path, |file| classic::write(file, attributes, arrays));
+    }
+    let bytes = by_library(attributes, arrays)
         .map_err(|error| Stop::new(format!("cannot write {}: {error}", path.display())))?;
-    let options = NcWriteOptions { format: NcWriteFormat::Offset64 };
-    files::write_atomic_with(path, |file| match encoded.write(file, options) {
-        Ok(_) => Ok(()),
-        Err(netcdf_writer::Error::Io(error)) => Err(error),
-        Err(error) => Err(io::Error::other(error)),
-    })
+    files::write_atomic(path, &bytes)
 }
 
-fn encode(
+/// The bytes of the file, by the library.
+pub(crate) fn by_library(
     attributes: &[(&str, String)],
     arrays: &[Array<'_>],
-) -> Result<NcFileBuilder, netcdf_writer::Error> {
+) -> Result<Vec<u8>, netcdf_writer::Error> {
     let mut builder = NcFileBuilder::new();
     for (name, value) in attributes {
         builder.add_attribute(*name, NcAttrValue::Chars(value.clone()))?;
@@ -84,7 +88,8 @@ fn encode(
         }
         builder.write_variable(variable, &array.values)?;
     }
-    Ok(builder)
+    let options = NcWriteOptions { format: NcWriteFormat::Offset64 };
+    Ok(builder.to_vec(options)?.1)
 }
 
 /// Reads one array of a file that [`fn@write`] wrote.

@@ -3,6 +3,7 @@
 
 mod adopt;
 pub mod arrays;
+mod classic;
 pub mod directory;
 mod growth;
 pub mod made_by;
