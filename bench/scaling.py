@@ -107,8 +107,8 @@ AXES = {
     "runs": [{"runs": n} for n in (600, 2000, 10_000, 100_000)],
     "outputs": [{"outputs": n} for n in (1000, 10_000, 100_000)],
     "parameters": [{"parameters": n, "outputs": 100, "runs": 500, "walkers": max(120, 4 * n)} for n in (3, 10, 30, 100)],
-    "walkers": [{"walkers": n} for n in (120, 1000, 10_000)],
-    "points": [{"replicates": n} for n in (20, 200, 2000)],
+    "walkers": [{"walkers": n, "outputs": 100} for n in (120, 1000, 10_000)],
+    "points": [{"replicates": n, "outputs": 100} for n in (20, 200, 2000, 20_000)],
 }
 SIZES = {"runs": "runs", "outputs": "outputs", "parameters": "parameters", "walkers": "walkers", "points": "replicates"}
 
@@ -123,7 +123,7 @@ def main():
                 folder = pathlib.Path(folder)
                 study(folder, **case)
                 seconds, memory, error = measured(folder)
-            size = case[SIZES[axis]] * (1000 if axis == "points" else 1)
+            size = case[SIZES[axis]] * (100 if axis == "points" else 1)
             table = 8 * case.get("runs", 200) * case.get("outputs", 1000) / 2**20
             if seconds is None:
                 print(f"| {size} | {error} | {memory:.0f} | {table:.0f} | |", flush=True)
