@@ -7,6 +7,7 @@
 mod book;
 mod effects;
 pub mod markdown;
+mod reliability;
 mod summary;
 mod translated;
 
@@ -16,8 +17,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use lacuna::plugin::registry;
-use lacuna_engine::study::language;
+use lacuna::text::emit;
 use lacuna_engine::study::resolve::{load, load_text};
+use lacuna_engine::study::{Study, language};
 // Without this line the linker leaves the plugins out.
 use lacuna_plugins as _;
 
@@ -189,6 +191,15 @@ fn examples_of_studies_are_accepted() {
     assert!(refused.is_empty(), "{refused}");
 }
 
+/// A run goes on from the study with its defaults (`resolved.toml`), which must be the same study.
+fn comes_back(path: &Path, study: &Study) {
+    let written = emit::to_toml(&study.resolved).unwrap();
+    let again = load_text(path, &written, &[]);
+    let complaints = again.complaints();
+    let again = again.study.unwrap_or_else(|| panic!("{}: {complaints}", path.display()));
+    assert_eq!(emit::to_toml(&again.resolved).unwrap(), written, "{}", path.display());
+}
+
 #[test]
 fn shipped_studies_are_accepted() {
     let mut count = 0;
@@ -205,6 +216,9 @@ fn shipped_studies_are_accepted() {
                 let complaints = loaded.complaints();
                 let sound = loaded.problems.sorted().iter().all(|p| absent(&p.message));
                 assert!(sound, "{complaints}");
+                if let Some(study) = &loaded.study {
+                    comes_back(&path, study);
+                }
                 count += 1;
             }
         }

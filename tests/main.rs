@@ -23,6 +23,7 @@ mod fidelity;
 mod fields;
 mod forced_oscillator;
 mod forward;
+mod fuzz;
 mod gap;
 mod gate;
 mod gradients;

@@ -13,6 +13,7 @@ use crate::protocol::{
     OutputSizes, Support,
 };
 
+pub use answer::read as read_answer;
 pub use error::Error;
 
 /// Largest response that is read, in bytes.

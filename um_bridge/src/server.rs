@@ -6,10 +6,11 @@ mod answer;
 mod model;
 mod turns;
 
-use std::io;
+use std::io::{self, Read, Write};
 use std::net::{IpAddr, SocketAddr};
+use std::sync::atomic::AtomicU64;
 
-use crate::http::{Listener, Request, Response, Site};
+use crate::http::{self, Listener, Request, Response, Site};
 use crate::protocol::{Failed, Fault, INTERNAL_ERROR, INVALID_INPUT};
 
 pub use crate::http::Stopper;
@@ -50,6 +51,14 @@ impl Server {
     pub fn serve(&self, models: &[&dyn Model], at_a_time: usize) -> u64 {
         self.0.serve(&Shared { models, turns: Turns::of(at_a_time.max(1)) })
     }
+}
+
+/// Responds to the requests of one stream until it ends: the server without its port. Returns the number of requests served.
+pub fn converse(stream: impl Read + Write, models: &[&dyn Model]) -> u64 {
+    let answered = AtomicU64::new(0);
+    let shared = Shared { models, turns: Turns::of(1) };
+    http::converse(stream, &shared, || false, &answered);
+    answered.into_inner()
 }
 
 impl Site for Shared<'_> {

@@ -18,6 +18,8 @@ mod basic;
 pub mod check;
 pub mod guard;
 pub mod header;
+#[doc(hidden)]
+pub mod hostile;
 pub mod linear;
 pub mod memo;
 pub mod object;

@@ -1,5 +1,7 @@
 //! Named arrays in a NetCDF file: the format in which stages store numbers, readable by every netCDF tool.
 
+mod classic;
+
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -9,8 +11,6 @@ use lacuna::plugin::model::Response;
 use lacuna::run::{Stop, files};
 use netcdf_reader::{NcFile, NcType, NcVariable};
 use netcdf_writer::{NcAttrValue, NcFileBuilder, NcWriteFormat, NcWriteOptions};
-
-use crate::classic;
 
 /// An array with named dimensions.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +61,7 @@ pub fn write(path: &Path, attributes: &[(&str, String)], arrays: &[Array<'_>]) -
 }
 
 /// The bytes of the file, by the library.
-pub(crate) fn by_library(
+fn by_library(
     attributes: &[(&str, String)],
     arrays: &[Array<'_>],
 ) -> Result<Vec<u8>, netcdf_writer::Error> {

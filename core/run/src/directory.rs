@@ -303,8 +303,12 @@ impl RunDirectory {
         kept
     }
 
+    /// Place of a stage's folder that was made for these inputs, while it stands aside. A mark that is no hash, such as that of
+    /// a damaged file, is hashed: it must neither be too short nor lead out of the directory.
     pub(super) fn aside(&self, stage: &Folder, inputs: &str) -> PathBuf {
-        self.root.join(".kept").join(format!("{stage}-{}", &inputs[..12]))
+        let is_hash = inputs.len() == 64 && inputs.bytes().all(|byte| byte.is_ascii_hexdigit());
+        let hash = if is_hash { inputs.to_owned() } else { files::hash(inputs.as_bytes()) };
+        self.root.join(".kept").join(format!("{stage}-{}", &hash[..12]))
     }
 
     /// Makes the stage's folder the one for these inputs, moving another aside.

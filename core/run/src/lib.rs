@@ -3,7 +3,6 @@
 
 mod adopt;
 pub mod arrays;
-mod classic;
 pub mod directory;
 mod growth;
 pub mod made_by;

@@ -62,7 +62,7 @@ pub struct Summary {
 pub struct Part {
     /// Number of these runs.
     pub runs: usize,
-    /// Whether each output has the terms of all outputs together.
+    /// True if each output has the terms of all outputs together.
     pub common: bool,
 }
 

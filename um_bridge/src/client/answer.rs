@@ -8,8 +8,8 @@ use crate::protocol::Failed;
 /// Largest number of characters of a response that are shown.
 const SHOWN: usize = 120;
 
-/// Decodes a response.
-pub(super) fn read<T: DeserializeOwned>(url: &str, status: u16, body: &[u8]) -> Result<T, Error> {
+/// Decodes a response: the HTTP status and the body with which the server at `url` answered.
+pub fn read<T: DeserializeOwned>(url: &str, status: u16, body: &[u8]) -> Result<T, Error> {
     let url = url.to_owned();
     let text = with_nulls(&String::from_utf8_lossy(body));
     if let Ok(Failed { error: fault }) = serde_json::from_str(&text) {

@@ -1,10 +1,12 @@
 //! One client connection: its requests, one after the other.
 
+use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use super::Site;
 use super::listener::Shared;
 use super::reader::{Nothing, Reader};
 
@@ -22,17 +24,27 @@ pub(super) fn attend(stream: TcpStream, shared: &Shared<'_>) {
     if prepared.is_err() {
         return;
     }
-    let site = shared.site;
+    let (stopper, answered) = (shared.stopper, &shared.answered);
+    converse(stream, shared.site, || stopper.is_stopped(), answered);
+}
+
+/// Serves the requests of a stream until it ends or `stopped` says so; `answered` counts them.
+pub(crate) fn converse(
+    stream: impl Read + Write,
+    site: &dyn Site,
+    stopped: impl Fn() -> bool,
+    answered: &AtomicU64,
+) {
     let mut reader = Reader::new(stream, site.longest_body());
     loop {
-        match reader.next(|| shared.stopper.is_stopped()) {
+        match reader.next(&stopped) {
             Ok(request) => {
                 // A panic must fail only its own request.
                 let response = catch_unwind(AssertUnwindSafe(|| site.answer(&request)));
                 let response =
                     response.unwrap_or_else(|_| site.refusal(500, "the server failed".to_owned()));
-                shared.answered.fetch_add(1, Ordering::Relaxed);
-                let stays = request.stays && !shared.stopper.is_stopped();
+                answered.fetch_add(1, Ordering::Relaxed);
+                let stays = request.stays && !stopped();
                 let head_only = request.method == "HEAD";
                 if reader.answer(response, head_only, stays).is_err() || !stays {
                     return;

@@ -7,6 +7,7 @@ mod reader;
 
 use std::fs::File;
 
+pub(crate) use connection::converse;
 pub use listener::{Listener, Stopper};
 
 /// A request.

@@ -177,9 +177,14 @@ fn head(bytes: &[u8], longest: usize) -> Result<Option<Head>, Nothing> {
     }
     let length = match header("content-length") {
         None => 0,
-        Some(text) => text.parse().map_err(|_| {
-            Nothing::Refused(400, format!("`Content-Length` is `{text}`, not a number of bytes"))
-        })?,
+        // RFC 9110, section 8.6: digits alone; a sign could mean another end of the body to a proxy.
+        Some(text) => (text.bytes().all(|byte| byte.is_ascii_digit()))
+            .then(|| text.parse().ok())
+            .flatten()
+            .ok_or_else(|| {
+                let text = format!("`Content-Length` is `{text}`, not a number of bytes");
+                Nothing::Refused(400, text)
+            })?,
     };
     if length > longest {
         let text = format!("a body of {length} bytes is too long; the most is {longest}");

@@ -252,6 +252,11 @@ fn what_is_no_question_is_refused_without_harm() {
                 "`Content-Length` is `1e3`",
             ),
             (
+                raw(address, b"POST /Evaluate HTTP/1.1\r\nContent-Length: +2\r\n\r\n{}"),
+                "HTTP/1.1 400",
+                "`Content-Length` is `+2`",
+            ),
+            (
                 raw(address, b"POST /Evaluate HTTP/1.1\r\nContent-Length: 999999999999\r\n\r\n"),
                 "HTTP/1.1 413",
                 "too long",

@@ -40,21 +40,32 @@ struct Meaning {
 
 impl Meaning {
     const ONE: Self = Self { factor: 1.0, decimals: 0, offset: 0.0, sixths: [0; BASES] };
+    /// Largest exponent of a base quantity, in sixths.
+    const LARGEST: i16 = 6 * 500;
+    /// Largest power of ten.
+    const MOST_DECIMALS: i32 = 300;
 
-    fn times(self, other: Self) -> Self {
-        let mut sixths = self.sixths;
-        for (sum, term) in sixths.iter_mut().zip(other.sixths) {
-            *sum += term;
-        }
-        Self {
-            factor: self.factor * other.factor,
-            decimals: self.decimals + other.decimals,
-            offset: 0.0,
-            sixths,
-        }
+    /// The unit, unless it is too large to be computed with.
+    fn bounded(self) -> Option<Self> {
+        let is_sound =
+            self.sixths.iter().all(|sixths| sixths.unsigned_abs() <= Self::LARGEST.unsigned_abs())
+                && self.decimals.unsigned_abs() <= Self::MOST_DECIMALS.unsigned_abs()
+                && self.factor.is_normal();
+        is_sound.then_some(self)
     }
 
-    /// The unit raised to the power `sixths / 6`; `None` if an exponent of the result is not a multiple of 1/6.
+    /// Product; `None` if it is too large.
+    fn times(self, other: Self) -> Option<Self> {
+        let mut sixths = self.sixths;
+        for (sum, term) in sixths.iter_mut().zip(other.sixths) {
+            *sum = sum.checked_add(term)?;
+        }
+        let decimals = self.decimals.checked_add(other.decimals)?;
+        Self { factor: self.factor * other.factor, decimals, offset: 0.0, sixths }.bounded()
+    }
+
+    /// The unit raised to the power `sixths / 6`; `None` if an exponent of the result is not a multiple of 1/6, or too
+    /// large.
     fn power(self, sixths: i16) -> Option<Self> {
         let scale = |exponent: i32| {
             let product = exponent.checked_mul(i32::from(sixths))?;
@@ -74,7 +85,7 @@ impl Meaning {
         } else {
             self.factor.powf(power)
         };
-        Some(Self { factor: factor * rest, decimals, offset: 0.0, sixths: exponents })
+        Self { factor: factor * rest, decimals, offset: 0.0, sixths: exponents }.bounded()
     }
 }
 
@@ -144,7 +155,7 @@ impl Unit {
         Self { text: "K".to_owned(), meaning: Meaning { offset: 0.0, ..self.meaning } }
     }
 
-    /// Product of two units; `None` if one of them has an offset (`degC`).
+    /// Product of two units; `None` if one of them has an offset (`degC`), or if its powers are too large.
     pub fn times(&self, other: &Self) -> Option<Self> {
         if [self, other].iter().any(|unit| unit.meaning.offset != 0.0) {
             return None;
@@ -153,7 +164,7 @@ impl Unit {
             ["" | "1", text] | [text, "" | "1"] => text.to_owned(),
             both => both.map(in_parentheses).join(" "),
         };
-        Some(Self { text, meaning: self.meaning.times(other.meaning) })
+        Some(Self { text, meaning: self.meaning.times(other.meaning)? })
     }
 
     /// Power of the unit; `None` if an exponent of the result is not a multiple of 1/6, or if the unit has an offset
@@ -196,7 +207,8 @@ impl Unit {
         for symbol in ["V", "ohm"] {
             let Ok(unit) = Self::parse(symbol) else { continue };
             for sixths in (-24..=24).filter(|sixths| *sixths != 0) {
-                let rest = unit.meaning.power(-sixths).map(|inverse| inverse.times(self.meaning));
+                let rest =
+                    unit.meaning.power(-sixths).and_then(|inverse| inverse.times(self.meaning));
                 if let Some(rest) = rest {
                     let factors = [(symbol, sixths)].into_iter().chain(bases(rest.sixths));
                     all.push(factors.collect());

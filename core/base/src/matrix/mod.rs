@@ -11,10 +11,31 @@ pub use product::{multiply_vector, transposed_multiply_vector};
 ///
 /// Stages pass rows to each other: one run, one draw, one replicate. A row is a slice.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored")]
 pub struct Matrix {
     rows: usize,
     columns: usize,
     data: Vec<f64>,
+}
+
+/// A matrix as it stands in a file, which may be damaged.
+#[derive(Deserialize)]
+struct Stored {
+    rows: usize,
+    columns: usize,
+    data: Vec<f64>,
+}
+
+impl TryFrom<Stored> for Matrix {
+    type Error = String;
+
+    fn try_from(Stored { rows, columns, data }: Stored) -> Result<Self, String> {
+        if rows.checked_mul(columns) == Some(data.len()) {
+            return Ok(Self { rows, columns, data });
+        }
+        let count = data.len();
+        Err(format!("a matrix of {rows} rows and {columns} columns has {count} numbers"))
+    }
 }
 
 impl Matrix {
@@ -177,5 +198,23 @@ impl std::ops::IndexMut<(usize, usize)> for Matrix {
     #[inline]
     fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut f64 {
         &mut self.data[i * self.columns + j]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stored_matrix_has_as_many_numbers_as_it_says() {
+        let read = |text: &str| serde_json::from_str::<Matrix>(text);
+        let matrix = Matrix::from_fn(2, 3, |i, j| (i * 3 + j) as f64 / 7.0);
+        assert_eq!(read(&serde_json::to_string(&matrix).unwrap()).unwrap(), matrix);
+        for (rows, columns) in [(2, 2), (0, 3), (usize::MAX, 3), (3, usize::MAX / 2)] {
+            let text =
+                format!(r#"{{"rows": {rows}, "columns": {columns}, "data": [1.0, 2.0, 3.0]}}"#);
+            let error = read(&text).unwrap_err().to_string();
+            assert!(error.contains(&format!("{rows} rows and {columns} columns has 3")), "{error}");
+        }
     }
 }

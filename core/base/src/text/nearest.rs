@@ -1,7 +1,13 @@
 //! Suggestions ("did you mean"): the known word closest to an unknown one.
 
+/// Longest word that is compared, in bytes: the time grows with its length, and nothing that is known is nearly as long.
+const LONGEST: usize = 200;
+
 /// The candidate that `word` was most likely meant to be; `None` if none is close enough to suggest.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    if word.len() > LONGEST {
+        return None;
+    }
     let lower = word.to_lowercase();
     candidates
         .into_iter()
@@ -13,8 +19,11 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
 }
 
 fn few_edits(word: &str, candidate: &str) -> bool {
-    let allowed = (word.chars().count() / 3).min(2);
-    strsim::damerau_levenshtein(word, &candidate.to_lowercase()) <= allowed
+    let length = word.chars().count();
+    let allowed = (length / 3).min(2);
+    // The distance is never below the difference of the lengths, which is known sooner.
+    candidate.chars().count().abs_diff(length) <= allowed
+        && strsim::damerau_levenshtein(word, &candidate.to_lowercase()) <= allowed
 }
 
 /// A list of names for a sentence: "`a`, `b` or `c`".

@@ -107,8 +107,10 @@ pub(super) fn table(
         let rare: Result<Vec<Table>, _> = study.reliability.iter().map(written).collect();
         later.insert("reliability", rare?.into());
     }
-    later.insert("validate", to_table(&study.validate)?.into());
-    // Without measurements the section would be refused.
+    // Beside a target the section would be refused, and without measurements the next one.
+    if study.target.is_none() {
+        later.insert("validate", to_table(&study.validate)?.into());
+    }
     if study.measurements.is_some() {
         later.insert("gap", gap(&study.gap)?.into());
     }

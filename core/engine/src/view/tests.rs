@@ -138,6 +138,19 @@ fn draws_that_are_not_those_of_the_checkpoint_are_left_out() {
     assert_eq!(sampling(), None);
     fs::write(calibrate.join("inputs.sha256"), "abc\n").unwrap();
     let state = fs::read(calibrate.join("state.json")).unwrap();
+    // Sizes that no file holds.
+    let stated: serde_json::Value = serde_json::from_slice(&state).unwrap();
+    for (steps, rows, columns, data) in [
+        (json!(u64::MAX), 2_u64, 1, json!([0.0, 0.0])),
+        (json!(1_u64 << 40), 1_u64, 1, json!([0.0])),
+        (json!(0), 1_u64 << 40, 0, json!([])),
+    ] {
+        let mut other = stated.clone();
+        other["step"] = steps;
+        other["state"]["points"] = json!({ "rows": rows, "columns": columns, "data": data });
+        fs::write(calibrate.join("state.json"), other.to_string()).unwrap();
+        assert_eq!(sampling(), None);
+    }
     fs::write(calibrate.join("state.json"), &state[..state.len() / 2]).unwrap();
     assert_eq!(sampling(), None);
     fs::remove_file(calibrate.join("sampling.json")).unwrap();

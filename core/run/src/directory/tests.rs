@@ -87,6 +87,22 @@ fn a_damaged_artifact_is_made_again() {
 }
 
 #[test]
+fn a_damaged_mark_is_moved_aside_inside_the_directory() {
+    for mark in ["short", "ä", "../../../../elsewhere", &"é".repeat(40)] {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().join("run");
+        fs::create_dir_all(root.join("3-read")).unwrap();
+        fs::write(root.join("3-read").join(INPUTS), mark).unwrap();
+        fs::write(root.join("3-read/number.json"), "0.7").unwrap();
+        let mut run = RunDirectory::open(&root).unwrap();
+        assert_eq!(keep(&mut run, 1, 0.1), (0.1, true));
+        let aside: Vec<_> = fs::read_dir(root.join(".kept")).unwrap().flatten().collect();
+        assert_eq!(aside.len(), 1, "{mark}");
+        assert_eq!(fs::read_to_string(aside[0].path().join("number.json")).unwrap(), "0.7");
+    }
+}
+
+#[test]
 fn an_interrupted_stage_finds_what_it_wrote() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = RunDirectory::open(folder.path()).unwrap();

@@ -124,6 +124,10 @@ impl<'a> Parser<'a> {
 
     fn labelled(&mut self, number: usize, line: &str, labels: Labels) -> Result<bool, ReadError> {
         if self.labels.is_empty() {
+            // Labels name the columns: they cannot begin below rows without labels.
+            if !self.rows.is_empty() {
+                return Ok(false);
+            }
             let shape: Vec<(String, usize)> =
                 labels.iter().map(|(name, values)| (name.clone(), values.len())).collect();
             let flat = flattened(&shape);

@@ -139,6 +139,9 @@ fn what_cannot_be_read_is_named() {
     assert_eq!(text, "run.txt, line 3: expected a row of 2 numbers, found `2.0, x1.0`");
     let text = complaint("Time, a\n 1.0, 2.0\nTime, b\n 3.0, 4.0\n");
     assert!(text.contains("line 3: the header changes to `Time`, `b`"), "{text}");
+    // Labels below rows without them, which would give the earlier rows too few columns.
+    let text = complaint("1.0, 2.0\n2.0, 3.0\ntime=3.0, a=4.0, b=5.0\ntime=4.0, a=5.0, b=6.0\n");
+    assert!(text.contains("line 3: expected a row of 2 numbers, found `time=3.0"), "{text}");
     assert!(complaint("").contains("is empty"));
     assert!(complaint("a\0b").contains("zero bytes"));
     let table = parse("strain_B=1.0, strain_C=2.0\n");

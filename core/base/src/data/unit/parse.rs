@@ -4,11 +4,20 @@ use std::ops::Range;
 
 use super::{Meaning, UnitError, symbols};
 
+/// Longest text of a unit, in bytes.
+const LONGEST: usize = 2000;
+/// Deepest nesting of parentheses.
+const DEEPEST: usize = 100;
+
 /// Meaning of a complete text.
 pub(super) fn parse(text: &str) -> Result<Meaning, UnitError> {
-    let mut parser = Parser { text, at: 0, factors: 0, affine: None };
+    let mut parser = Parser { text, at: 0, factors: 0, depth: 0, affine: None };
     if text.trim().is_empty() {
         return Ok(Meaning::ONE);
+    }
+    if text.len() > LONGEST {
+        let message = format!("a text of {} bytes is too long for a unit", text.len());
+        return Err(parser.wrong(0..0, message));
     }
     let meaning = parser.product()?;
     if parser.peek() == Some(')') {
@@ -32,6 +41,8 @@ struct Parser<'t> {
     at: usize,
     /// Number of symbols and powers read so far.
     factors: usize,
+    /// Number of open parentheses.
+    depth: usize,
     /// Offset of a unit that has one (`degC`), and its byte range.
     affine: Option<(f64, Range<usize>)>,
 }
@@ -92,7 +103,9 @@ impl Parser<'_> {
             }
             divided |= divide;
             let factor = if divide { self.raise(factor, -6, operator)? } else { factor };
-            product = product.times(factor);
+            product = product
+                .times(factor)
+                .ok_or_else(|| self.wrong(0..self.at, "the powers of this unit are too large"))?;
         }
     }
 
@@ -120,7 +133,12 @@ impl Parser<'_> {
         match self.peek() {
             Some('(') => {
                 self.bump();
+                self.depth += 1;
+                if self.depth > DEEPEST {
+                    return Err(self.wrong(start..start + 1, "there are too many `(`"));
+                }
                 let inside = self.product()?;
+                self.depth -= 1;
                 if self.peek() != Some(')') {
                     return Err(self.wrong(start..start + 1, "this `(` is not closed"));
                 }
@@ -179,6 +197,9 @@ impl Parser<'_> {
         if open {
             self.bump();
             let range = self.take_while(|c| c != ')');
+            if self.peek().is_none() {
+                return Err(self.wrong(range.start - 1..range.start, "this `(` is not closed"));
+            }
             self.bump();
             let written = self.text[range].to_owned();
             return self.sixths(&written, start).map(Some);

@@ -159,10 +159,13 @@ pub(super) fn nearest(symbol: &str) -> Option<String> {
         .collect();
     let same_letters = all.iter().find(|known| known.to_lowercase() == lower);
     let close = || {
-        let long_enough = symbol.chars().count() > 2;
-        let mut by_edits =
-            all.iter().filter(|known| strsim::damerau_levenshtein(symbol, known) == 1);
-        by_edits.next().filter(|_| long_enough)
+        let length = symbol.chars().count();
+        // The distance is never below the difference of the lengths, which is known sooner.
+        let near = |known: &&String| {
+            known.chars().count().abs_diff(length) <= 1
+                && strsim::damerau_levenshtein(symbol, known) == 1
+        };
+        if length > 2 { all.iter().find(near) } else { None }
     };
     same_letters.or_else(close).cloned()
 }

@@ -121,6 +121,36 @@ fn no_text_panics() {
 }
 
 #[test]
+fn units_that_cannot_be_computed_with_are_refused() {
+    let deep = format!("{}m{}", "(".repeat(100_000), ")".repeat(100_000));
+    let many = "m/".repeat(30_000) + "m";
+    let word = "x".repeat(60_000);
+    let inside = format!("{}m{}", "(".repeat(300), ")".repeat(300));
+    let sum = ["(m^20)^20"; 100].join("*");
+    for (text, message) in [
+        ("m^(-5", "this `(` is not closed"),
+        (deep.as_str(), "too long"),
+        (&many, "too long"),
+        (&word, "too long"),
+        (&inside, "there are too many `(`"),
+        (&sum, "the powers of this unit are too large"),
+        ("((km^20)^20)^20", "too large"),
+        ("((min/s)^20)^20", "too large"),
+        ("(%^20)^20", "too large"),
+    ] {
+        let error = Unit::parse(text).unwrap_err();
+        assert!(
+            error.message.contains(message),
+            "{}: {}",
+            &text[..text.len().min(40)],
+            error.message
+        );
+    }
+    assert_eq!(unit("(m^20)^20").times(&unit("(m^20)^20")), None);
+    assert_eq!(unit("(((m)))"), unit("m"));
+}
+
+#[test]
 fn units_are_shown_as_written() {
     let written: Unit = serde_json::from_str("\"kg*m^-3\"").unwrap();
     assert_eq!(serde_json::to_string(&written).unwrap(), "\"kg*m^-3\"");

@@ -33,11 +33,17 @@ pub fn look(folder: &Path, most: usize) -> Option<Look> {
     let Checkpoint { step: steps, planned, state, statistics, inputs } = checkpoint;
     let (chains, dimension) = (state.points.rows(), state.points.columns());
     let shape = Shape { chains, dimension, told: statistics.len() };
-    if inputs != lacuna_run::inputs_of(folder) || chains == 0 {
+    if inputs != lacuna_run::inputs_of(folder) || chains == 0 || dimension == 0 {
+        return None;
+    }
+    let file = File::open(folder.join(super::log::DRAWS)).ok()?;
+    // A damaged checkpoint can state any number of steps: they are read where the file has them.
+    let whole = steps.checked_mul(shape.bytes())?;
+    if whole as u64 > file.metadata().ok()?.len() {
         return None;
     }
     let every = (steps * chains * dimension).div_ceil(most.max(1)).max(1);
-    let mut file = BufReader::new(File::open(folder.join(super::log::DRAWS)).ok()?);
+    let mut file = BufReader::new(file);
     let mut record = vec![0; shape.bytes()];
     let between = i64::try_from((every - 1) * shape.bytes()).ok()?;
     let mut records = Vec::with_capacity(steps.div_ceil(every));

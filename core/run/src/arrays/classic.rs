@@ -1,11 +1,11 @@
 //! Large arrays as a classic netCDF file with 64-bit offsets, written number by number.
 //!
-//! The library of [`super::arrays`] holds several copies of all numbers while it writes, which gigabytes do not allow. The
+//! The library of [`super`] holds several copies of all numbers while it writes, which gigabytes do not allow. The
 //! bytes are the same (see the tests). Format: NetCDF Classic and 64-bit Offset File Formats, Unidata (2011).
 
 use std::io::{self, Write};
 
-use crate::arrays::Array;
+use super::Array;
 
 const DIMENSIONS: u32 = 0x0A;
 const VARIABLES: u32 = 0x0B;
@@ -15,7 +15,7 @@ const DOUBLE: u32 = 6;
 
 /// Returns true if the file can be written here: no dimension may be empty, which would be the unlimited one, and sizes
 /// have to fit the format's fields.
-pub(crate) fn is_possible(arrays: &[Array<'_>]) -> bool {
+pub(super) fn is_possible(arrays: &[Array<'_>]) -> bool {
     let fits = |size: usize| size > 0 && u32::try_from(size).is_ok();
     let whole = |array: &Array<'_>| {
         array.dimensions.iter().all(|(_, size)| fits(*size))
@@ -31,7 +31,7 @@ pub(crate) fn is_possible(arrays: &[Array<'_>]) -> bool {
 }
 
 /// Writes arrays and text attributes.
-pub(crate) fn write(
+pub(super) fn write(
     file: &mut impl Write,
     attributes: &[(&str, String)],
     arrays: &[Array<'_>],
@@ -112,7 +112,6 @@ fn number(bytes: &mut Vec<u8>, number: usize) {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::arrays;
 
     fn array(name: &str, dimensions: &[(&str, usize)], unit: Option<&str>) -> Array<'static> {
         let dimensions: Vec<(String, usize)> =
@@ -134,7 +133,7 @@ mod tests {
             let mut own = Vec::new();
             write(&mut own, &attributes, &arrays).unwrap();
             assert!(is_possible(&arrays));
-            assert_eq!(own, arrays::by_library(&attributes, &arrays).unwrap());
+            assert_eq!(own, super::super::by_library(&attributes, &arrays).unwrap());
         }
     }
 
