@@ -43,7 +43,7 @@ pub fn reply(bytes: &[u8]) -> Result<Reply, Refusal> {
             // SAFETY: what is given is there during the call, or says of itself that it cannot be.
             match what {
                 0 => unsafe {
-                    text(&answer, take.byte().map_or(&[][..], |n| take.bytes(n.into())))
+                    text(&answer, take.byte().map_or(&[][..], |n| take.bytes(n.into())));
                 },
                 1 => unsafe { odd_text(&answer, take.word().unwrap_or(0)) },
                 2 => {

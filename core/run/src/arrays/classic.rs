@@ -65,7 +65,9 @@ fn header(attributes: &[(&str, String)], arrays: &[Array<'_>], mut begin: u64) -
         number(&mut bytes, *length);
     }
     list(&mut bytes, ATTRIBUTES, attributes.len());
-    attributes.iter().for_each(|(name, value)| attribute(&mut bytes, name, value));
+    for (name, value) in attributes {
+        attribute(&mut bytes, name, value);
+    }
     list(&mut bytes, VARIABLES, arrays.len());
     for array in arrays {
         text(&mut bytes, &array.name);
@@ -74,7 +76,9 @@ fn header(attributes: &[(&str, String)], arrays: &[Array<'_>], mut begin: u64) -
             number(&mut bytes, dimensions.iter().position(|(known, _)| known == name).unwrap_or(0));
         }
         list(&mut bytes, ATTRIBUTES, usize::from(array.unit.is_some()));
-        array.unit.iter().for_each(|unit| attribute(&mut bytes, "units", unit));
+        if let Some(unit) = &array.unit {
+            attribute(&mut bytes, "units", unit);
+        }
         bytes.extend(DOUBLE.to_be_bytes());
         let size = 8 * array.values.len();
         number(&mut bytes, size);
