@@ -208,20 +208,17 @@ impl Problem<'_> {
             return Ok(self.fits(&outputs, progress)?.expansion(None));
         };
         let search = self.search();
-        let (components, found, scores) = match gradients {
-            Some(gradients) => {
-                let components = reduction.components(responses)?;
-                let dimension = self.coordinates.len();
-                let slopes = slopes::of_components(gradients, &components.directions, dimension);
-                let scores = self.outputs(&components.scores, Some(&slopes));
-                let found = search.choose_all(&scores, progress)?;
-                (components, found, scores)
-            }
-            None => {
-                let (components, found) = reduction.chosen(responses, &search, progress)?;
-                let scores = outputs(&components.scores);
-                (components, found, scores)
-            }
+        let (components, found, scores) = if let Some(gradients) = gradients {
+            let components = reduction.components(responses)?;
+            let dimension = self.coordinates.len();
+            let slopes = slopes::of_components(gradients, &components.directions, dimension);
+            let scores = self.outputs(&components.scores, Some(&slopes));
+            let found = search.choose_all(&scores, progress)?;
+            (components, found, scores)
+        } else {
+            let (components, found) = reduction.chosen(responses, &search, progress)?;
+            let scores = outputs(&components.scores);
+            (components, found, scores)
         };
         let (_, variances) = moments(responses);
         let fits = self.refits(&search, &scores, &found)?;
@@ -272,7 +269,7 @@ impl Problem<'_> {
         union.iter().enumerate().for_each(|(i, &t)| position[t] = i);
         let mut coefficients = Matrix::zeros(union.len(), fits.len());
         for (o, (fit, best)) in fits.iter().zip(found).enumerate() {
-            for (&t, &c) in terms_of(best).iter().zip(&fit.coefficients) {
+            for (&t, &c) in terms_of(best.as_ref()).iter().zip(&fit.coefficients) {
                 coefficients[(position[t], o)] = c;
             }
         }
@@ -287,7 +284,7 @@ impl Problem<'_> {
     /// Returns the terms of any output, in increasing order; the constant is always one of them.
     pub fn union(&self, found: &[Option<Best>]) -> Vec<usize> {
         let mut used = vec![false; self.sets.terms.len()];
-        found.iter().flat_map(terms_of).for_each(|&t| used[t] = true);
+        found.iter().flat_map(|best| terms_of(best.as_ref())).for_each(|&t| used[t] = true);
         used[0] = true;
         (0..used.len()).filter(|&t| used[t]).collect()
     }
@@ -307,7 +304,7 @@ impl Problem<'_> {
             rule: self.projection.as_ref().map(|p| format!("{}, level {}", p.rule.name(), p.level)),
             degrees: found.iter().map(|b| b.as_ref().map_or(0, |b| b.degree)).collect(),
             q_norms: best().map(|b| b.q_norm).collect(),
-            terms: found.iter().map(|b| terms_of(b).len()).collect(),
+            terms: found.iter().map(|b| terms_of(b.as_ref()).len()).collect(),
             candidates: self.sets.terms.len(),
             constant: variances.iter().filter(|v| **v == 0.0).count(),
             poor: relative.iter().filter(|e| **e >= 1.0).count(),
@@ -319,8 +316,8 @@ impl Problem<'_> {
 }
 
 /// Returns the terms of an output, which are the constant alone if none were chosen.
-fn terms_of(best: &Option<Best>) -> &[usize] {
-    best.as_ref().map_or(&[0], |b| &b.terms)
+fn terms_of(best: Option<&Best>) -> &[usize] {
+    best.map_or(&[0], |b| &b.terms)
 }
 
 /// Returns the fit of an output that does not vary.

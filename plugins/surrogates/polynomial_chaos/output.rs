@@ -37,7 +37,9 @@ pub(super) fn moments(responses: &Matrix) -> (Vec<f64>, Vec<f64>) {
     for row in responses.iter_rows() {
         means.iter_mut().zip(row).for_each(|(sum, y)| *sum += y);
     }
-    means.iter_mut().for_each(|mean| *mean /= runs);
+    for mean in &mut means {
+        *mean /= runs;
+    }
     let mut variances = vec![0.0; responses.columns()];
     for row in responses.iter_rows() {
         let deviations = row.iter().zip(&means).map(|(y, mean)| y - mean);

@@ -58,12 +58,12 @@ impl Problem<'_> {
         };
         let (means, variances) = moments(responses);
         if let Some(fits) = self.common(&found, responses, (&means, &variances), progress) {
-            return Ok(self.told(fits, part, true).expansion(None));
+            return Ok(told(fits, part, true).expansion(None));
         }
         let components = components.map(|c| c.of_all(responses));
         let all = outputs(components.as_ref().map_or(responses, |c| &c.scores));
         self.choose_rest(&all, &mut found)?;
-        let fits = self.told(self.refits(&self.search(), &all, &found)?, part, false);
+        let fits = told(self.refits(&self.search(), &all, &found)?, part, false);
         Ok(match components {
             Some(components) => fits.multiplied_back(&variances, &components),
             None => fits.expansion(None),
@@ -106,10 +106,11 @@ impl Problem<'_> {
         rest.into_iter().zip(chosen).for_each(|(o, best)| found[o] = best);
         Ok(())
     }
+}
 
-    fn told(&self, fits: Fits, part: &[usize], common: bool) -> Fits {
-        let part = Some(Part { runs: part.len(), common });
-        let summary = Summary { part, ..fits.summary };
-        Fits { summary, ..fits }
-    }
+/// Returns the fits with the number of runs on which the terms were chosen.
+fn told(fits: Fits, part: &[usize], common: bool) -> Fits {
+    let part = Some(Part { runs: part.len(), common });
+    let summary = Summary { part, ..fits.summary };
+    Fits { summary, ..fits }
 }

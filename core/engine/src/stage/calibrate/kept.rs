@@ -15,6 +15,10 @@ fn told(name: &str) -> String {
     format!("step_{name}")
 }
 
+fn array<'a>(name: &str, values: &'a [f64], dimensions: Vec<(String, usize)>) -> Array<'a> {
+    Array { name: name.to_owned(), dimensions, values: values.into(), unit: None }
+}
+
 impl Artifact for Calibrated {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
         let d = &self.draws;
@@ -22,9 +26,6 @@ impl Artifact for Calibrated {
             let both = [("chain".to_owned(), d.chains), ("step".to_owned(), d.steps)];
             both.into_iter().chain(last.map(|n| ("coordinate".to_owned(), n))).collect()
         };
-        fn array<'a>(name: &str, values: &'a [f64], dimensions: Vec<(String, usize)>) -> Array<'a> {
-            Array { name: name.to_owned(), dimensions, values: values.into(), unit: None }
-        }
         let mut arrays = vec![
             array("draws", &d.values, axes(Some(d.dimension()))),
             array("log_density", &d.log_density, axes(None)),
