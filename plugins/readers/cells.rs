@@ -187,28 +187,41 @@ pub fn grid_places(
     numbers.iter().map(|x| places.place(&x.to_string(), convert)).collect()
 }
 
-/// Returns the flat index that a heading of a wide table stands for, such as `B 1e-5` or `B:1e-5`.
-pub fn headed_place(layout: &Layout, heading: &str) -> Result<usize, String> {
-    if layout.axes.is_empty() {
-        let expected = &layout.name;
-        return if heading == expected {
-            Ok(0)
-        } else {
-            Err(format!("expected the column `{expected}`, found `{heading}`"))
+/// Places of values that the headings of a wide table stand for.
+pub struct Headings<'a> {
+    layout: &'a Layout,
+    places: Vec<Places<'a>>,
+}
+
+impl<'a> Headings<'a> {
+    /// Prepares the search in a response.
+    pub fn of(layout: &'a Layout) -> Self {
+        Self { layout, places: places(layout) }
+    }
+
+    /// Returns the flat index that a heading stands for, such as `B 1e-5` or `B:1e-5`.
+    pub fn place(&self, heading: &str) -> Result<usize, String> {
+        let layout = self.layout;
+        if layout.axes.is_empty() {
+            let expected = &layout.name;
+            return if heading == expected {
+                Ok(0)
+            } else {
+                Err(format!("expected the column `{expected}`, found `{heading}`"))
+            };
+        }
+        let parts: Vec<&str> = match layout.axes.len() {
+            // With a single axis the heading is not split, because labels may contain blanks.
+            1 => vec![heading],
+            _ => heading.split([' ', ':', ';', '|', '@']).filter(|part| !part.is_empty()).collect(),
         };
+        if parts.len() != layout.axes.len() {
+            let axes: Vec<String> = layout.axes.iter().map(example).collect();
+            return Err(format!("expected a heading like `{}`, found `{heading}`", axes.join(" ")));
+        }
+        let places = self.places.iter().zip(parts).map(|(axis, part)| axis.place(part, Some));
+        Ok(layout.index(&places.collect::<Result<Vec<_>, _>>()?))
     }
-    let parts: Vec<&str> = match layout.axes.len() {
-        // With a single axis the heading is not split, because labels may contain blanks.
-        1 => vec![heading],
-        _ => heading.split([' ', ':', ';', '|', '@']).filter(|part| !part.is_empty()).collect(),
-    };
-    if parts.len() != layout.axes.len() {
-        let axes: Vec<String> = layout.axes.iter().map(example).collect();
-        return Err(format!("expected a heading like `{}`, found `{heading}`", axes.join(" ")));
-    }
-    let places =
-        layout.axes.iter().zip(parts).map(|(axis, part)| Places::of(axis).place(part, Some));
-    Ok(layout.index(&places.collect::<Result<Vec<_>, _>>()?))
 }
 
 fn example(axis: &Axis) -> String {

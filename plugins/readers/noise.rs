@@ -7,7 +7,7 @@ use lacuna::data::{Layout, Measurements};
 use lacuna::plugin::reader::ReadError;
 use lacuna_linalg::Matrix;
 
-use super::cells::{LongColumns, headed_place};
+use super::cells::{Headings, LongColumns};
 use super::faults::Faults;
 use super::netcdf;
 use super::sheet::{Record, Sheet, delimiter};
@@ -154,10 +154,11 @@ fn headings(
     line: usize,
     cells: &[String],
 ) -> Result<Vec<usize>, ReadError> {
+    let headings = Headings::of(layout);
     let mut places = Vec::with_capacity(cells.len());
     for cell in cells {
         let at = |text: String| ReadError::new(path, text).at(format!("line {line}"));
-        let place = headed_place(layout, cell).map_err(at)?;
+        let place = headings.place(cell).map_err(at)?;
         if places.contains(&place) {
             return Err(at(format!("two columns are headed `{cell}`")));
         }

@@ -206,6 +206,60 @@ mod tests {
         assert!((left - third).abs() < 1e-12 * third);
     }
 
+    /// The products of the runs have the same components as the singular value decomposition, up to the sign of each.
+    #[test]
+    fn components_of_the_products_are_those_of_the_decomposition() {
+        let mut rng = Stream::root(2).generator();
+        let mut random = |rows, columns| Matrix::from_fn(rows, columns, |_, _| normal(&mut rng));
+        let scale = |m: Matrix| {
+            Matrix::from_fn(m.rows(), m.columns(), |i, j| m[(i, j)] * 0.3_f64.powi(j as i32))
+        };
+        let responses = lacuna_linalg::multiply(&scale(random(20, 6)), &random(6, 90));
+        let choice = Components::Variance(0.999);
+        let expected = choice.of(&responses).unwrap();
+        let mean = expected.mean.clone();
+        let centred = Matrix::from_fn(20, 90, |i, j| responses[(i, j)] - mean[j]);
+        let found = choice.by_runs(mean, centred).unwrap();
+        assert_eq!(found.scores.columns(), expected.scores.columns());
+        for k in 0..found.scores.columns() {
+            let sign = (found.directions[(0, k)] / expected.directions[(0, k)]).signum();
+            for i in 0..20 {
+                let size = expected.scores[(0, 0)].abs();
+                assert!(
+                    (sign * found.scores[(i, k)] - expected.scores[(i, k)]).abs() < 1e-9 * size
+                );
+            }
+            let length: f64 = found.directions.column(k).iter().map(|x| x * x).sum();
+            assert!((length - 1.0).abs() < 1e-10);
+        }
+        for (a, b) in found.truncation().iter().zip(expected.truncation()) {
+            assert!((a - b).abs() < 1e-9 * (1.0 + b), "{a} {b}");
+        }
+    }
+
+    /// Fewer components, and the components of some runs applied to all, leave the responses as they are.
+    #[test]
+    fn components_and_remainder_add_up_to_the_responses() {
+        let mut rng = Stream::root(3).generator();
+        let responses = Matrix::from_fn(30, 8, |_, j| 5.0 + j as f64 * normal(&mut rng));
+        let part = responses.select_rows(&(0..12).collect::<Vec<_>>());
+        let first = Components::Variance(1.0).of(&part).unwrap().first(3);
+        assert_eq!(first.scores.columns(), 3);
+        let direct = Components::Count(3).of(&part).unwrap();
+        for (a, b) in first.remainder.as_slice().iter().zip(direct.remainder.as_slice()) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+        for (found, of) in [(first.clone(), &part), (first.of_all(&responses), &responses)] {
+            let back = lacuna_linalg::multiply_transposed(&found.scores, &found.directions);
+            for i in 0..of.rows() {
+                for j in 0..8 {
+                    let whole = found.mean[j] + back[(i, j)] + found.remainder[(i, j)];
+                    assert!((whole - of[(i, j)]).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
     #[test]
     fn outputs_can_be_their_own_components() {
         let responses =

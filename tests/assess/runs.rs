@@ -1,9 +1,11 @@
 //! Runs, emulators and models that are not adequate for a calibration.
 
+use std::fmt::Write as _;
 use std::fs;
 
 use lacuna_engine::assess::{Level, Severity};
 use lacuna_engine::stage::contents;
+use lacuna_run::arrays;
 
 use super::{assess, change, findings, found, oscillator, stop};
 use crate::quick;
@@ -37,6 +39,35 @@ fn one_wrong_number_in_the_table_of_parameters_stops_the_run_with_its_line() {
     quick::replace(&table, "r02,19.06489,", "r02,2.490000,");
     let assessment = assess(folder.path(), &[]);
     assert_eq!(found(&assessment, "suspicious_run", Severity::Reservation).place, "run r02");
+}
+
+/// Of more than 5000 runs not all error curves are kept; a wrong run is found among all.
+#[test]
+fn one_wrong_run_among_thousands_is_named() {
+    let folder = quick::tables();
+    let (mut runs, mut responses) = (
+        "run,frequency [Hz],damping [1/s]\n".to_owned(),
+        "run,time [s],displacement [mm]\n".to_owned(),
+    );
+    for i in 0..5200 {
+        // Points of an additive recurrence (Roberts 2018), and the oscillator in closed form.
+        let along = |ratio: f64| (0.5 + ratio * f64::from(i)).fract();
+        let (frequency, damping) = (1.5 + along(0.754_877_67), 0.5 + 2.5 * along(0.569_840_29));
+        writeln!(runs, "r{i:04},{frequency},{damping}").unwrap();
+        for k in 1..=20 {
+            let t = 0.05 * f64::from(k);
+            let y = (-damping * t).exp() * (std::f64::consts::TAU * frequency * t).cos();
+            writeln!(responses, "r{i:04},{t:.2},{y}").unwrap();
+        }
+    }
+    fs::write(folder.path().join("runs.csv"), runs).unwrap();
+    fs::write(folder.path().join("responses.csv"), responses).unwrap();
+    change(folder.path(), "responses.csv", "r3001,", |y, _| 1.5 * y);
+    let findings = findings(folder.path(), &["surrogate.validation=100"]);
+    let finding = found(&findings.assessment, "suspicious_run", Severity::Reservation);
+    assert_eq!(finding.place, "run r3001");
+    let kept = arrays::read(&folder.path().join("run/4-surrogate/errors.nc"), "samples").unwrap();
+    assert_eq!(kept.dimensions[0].1, 5000 + 100);
 }
 
 /// One value of one run: 19.3 instead of 1.93.

@@ -106,20 +106,32 @@ pub fn read_some(path: &Path, name: &str) -> Result<Option<Array<'static>>, Stop
     let Some(variable) = variables.iter().find(|v| v.name() == name) else { return Ok(None) };
     let dimensions: Vec<(String, usize)> =
         variable.dimensions().iter().map(|d| (d.name.clone(), d.size as usize)).collect();
-    let values = numbers(&file, variable).map_err(|error| fail(error.to_string()))?;
+    let values = numbers(path, &file, variable).map_err(fail)?;
     let unit = variable.attribute("units").and_then(|attribute| attribute.value.as_string());
     Ok(Some(Array { name: name.to_owned(), dimensions, values, unit }))
 }
 
-/// The numbers of a variable; those of double precision are read in place.
-fn numbers(file: &NcFile, variable: &NcVariable) -> netcdf_reader::Result<Cow<'static, [f64]>> {
+/// The numbers of a variable; those of double precision are read in place. A damaged header can state any size: the
+/// memory is that of numbers for which the file has room.
+fn numbers(
+    path: &Path,
+    file: &NcFile,
+    variable: &NcVariable,
+) -> Result<Cow<'static, [f64]>, String> {
     let name = variable.name();
     if *variable.dtype() != NcType::Double || file.as_classic().is_none() {
-        return Ok(file.read_variable_as_f64(name)?.iter().copied().collect::<Vec<f64>>().into());
+        let values = file.read_variable_as_f64(name).map_err(|error| error.to_string())?;
+        return Ok(values.iter().copied().collect::<Vec<f64>>().into());
     }
-    let count = variable.dimensions().iter().map(|d| d.size as usize).product();
+    let room = std::fs::metadata(path).map_err(|error| error.to_string())?.len() / 8;
+    let sizes = variable.dimensions().iter().map(|d| d.size);
+    let count = sizes.fold(Some(1_u64), |count, size| count?.checked_mul(size));
+    let count = count
+        .filter(|count| *count <= room)
+        .and_then(|count| usize::try_from(count).ok())
+        .ok_or_else(|| format!("`{name}` is larger than the file"))?;
     let mut values = vec![0.0; count];
-    file.read_variable_into(name, &mut values)?;
+    file.read_variable_into(name, &mut values).map_err(|error| error.to_string())?;
     Ok(values.into())
 }
 
@@ -195,5 +207,40 @@ mod tests {
         assert_eq!(read(&path, "points").unwrap().into_matrix(), matrix);
         let missing = read(&path, "draws").unwrap_err();
         assert!(missing.message.ends_with("no variable `draws`"), "{missing}");
+    }
+
+    #[test]
+    fn large_arrays_come_back_bit_for_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.nc");
+        let matrix = Matrix::from_fn(LARGE / 1000 + 1, 1000, |i, j| (i * 1000 + j) as f64 / 7.0);
+        let points = Matrix::from_fn(matrix.rows(), 2, |i, j| (i + j) as f64);
+        let stored = [
+            Array::matrix("points", "run", "parameter", &points),
+            Array::matrix("responses", "run", "output", &matrix),
+        ];
+        write(&path, &[("title", "a test".to_owned())], &stored).unwrap();
+        assert_eq!(read(&path, "points").unwrap().into_matrix(), points);
+        assert_eq!(read(&path, "responses").unwrap().into_matrix(), matrix);
+    }
+
+    /// A header whose dimensions a flipped bit has changed, and a file that was cut off.
+    #[test]
+    fn a_size_that_the_file_does_not_have_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.nc");
+        let matrix = Matrix::from_fn(3, 2, |i, j| (i + j) as f64);
+        write(&path, &[], &[Array::matrix("points", "run", "parameter", &matrix)]).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        // Each dimension: the length of its name, the name, and its size.
+        let run = whole.windows(4).position(|name| name == b"run\0").unwrap() + 4;
+        for size in [7_u32, 1 << 20, u32::MAX] {
+            let mut damaged = whole.clone();
+            damaged[run..run + 4].copy_from_slice(&size.to_be_bytes());
+            std::fs::write(&path, &damaged).unwrap();
+            assert!(read(&path, "points").is_err(), "{size}");
+        }
+        std::fs::write(&path, &whole[..whole.len() - 8]).unwrap();
+        assert!(read(&path, "points").is_err());
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use lacuna::data::Layout;
 use lacuna::plugin::reader::ReadError;
 
-use crate::readers::cells::{LongColumns, headed_place};
+use crate::readers::cells::{Headings, LongColumns};
 use crate::readers::faults::Faults;
 use crate::readers::runs::Run;
 use crate::readers::sheet::{Record, Sheet};
@@ -89,6 +89,7 @@ fn wide_table(
 ) -> Vec<Option<Values>> {
     let mut columns = Vec::with_capacity(layout.len());
     let mut headed: Vec<Option<usize>> = vec![None; layout.len()];
+    let places = Headings::of(layout);
     for column in (0..sheet.headings.len()).filter(|&c| c != names.column) {
         let at = |text: String| {
             ReadError::new(&sheet.path, text).at(format!(
@@ -98,7 +99,7 @@ fn wide_table(
             ))
         };
         let heading = &sheet.headings[column].name;
-        let place = headed_place(layout, heading).map_err(|text| {
+        let place = places.place(heading).map_err(|text| {
             at(text).help("a wide table has the column `run` and one for each value of the response, headed by its place")
         });
         let conversion = sheet.conversion(column, &layout.unit);

@@ -83,8 +83,11 @@ pub(super) fn fit(
         squares.iter_mut().zip(row).for_each(|(sum, r)| *sum += r * r);
     }
     let correction = correction(runs, terms, trace);
-    let relative = |(sum, &v): (&f64, &f64)| {
-        if v > 0.0 { sum / runs as f64 / v * correction } else { 0.0 }
+    let relative = |(sum, &v): (&f64, &f64)| match sum / runs as f64 / v * correction {
+        _ if v == 0.0 => 0.0,
+        // A run that alone determines a term cannot be left out.
+        error if error.is_nan() => f64::INFINITY,
+        error => error,
     };
     let relative = squares.iter().zip(variances).map(relative).collect();
     Some(CommonFit { coefficients, relative, residuals })

@@ -15,9 +15,11 @@ use super::least_squares::Fit;
 use super::options::Solver;
 use super::output::{Output, moments, outputs};
 use super::quadrature::Projection;
+use super::reduction::Chosen;
 use super::search::{Best, Search};
 use super::slopes::{self, Slopes};
 use super::terms::{Basis, Sets};
+use crate::surrogates::principal_components::PrincipalComponents;
 
 /// Largest degree that is low enough for a warning if the number of terms allows no higher one.
 const LOW_DEGREE: usize = 3;
@@ -196,6 +198,7 @@ impl Problem<'_> {
         }
     }
 
+    /// Chooses and fits the terms on all runs.
     fn fit_from_all(
         &self,
         training: &Training<'_>,
@@ -208,18 +211,14 @@ impl Problem<'_> {
             return Ok(self.fits(&outputs, progress)?.expansion(None));
         };
         let search = self.search();
-        let (components, found, scores) = if let Some(gradients) = gradients {
-            let components = reduction.components(responses)?;
-            let dimension = self.coordinates.len();
-            let slopes = slopes::of_components(gradients, &components.directions, dimension);
-            let scores = self.outputs(&components.scores, Some(&slopes));
-            let found = search.choose_all(&scores, progress)?;
-            (components, found, scores)
-        } else {
-            let (components, found) = reduction.chosen(responses, &search, progress)?;
-            let scores = outputs(&components.scores);
-            (components, found, scores)
+        let scores_of = |components: &PrincipalComponents| {
+            let directions = &components.directions;
+            let slopes =
+                gradients.map(|g| slopes::of_components(g, directions, self.coordinates.len()));
+            self.outputs(&components.scores, slopes.as_ref())
         };
+        let Chosen { components, scores, found } =
+            reduction.chosen(responses, scores_of, &search, progress)?;
         let (_, variances) = moments(responses);
         let fits = self.refits(&search, &scores, &found)?;
         Ok(fits.multiplied_back(&variances, &components))

@@ -120,7 +120,7 @@ pub struct PolynomialChaos {
     pub components: Option<Components>,
     /// Number of runs on which sparse solvers choose the terms of each output if there are more; coefficients and
     /// errors are those of all runs. With ten runs for each term of all outputs together every output is fitted with
-    /// all of these terms. Default: 2000.
+    /// all of these terms, and its error is the leave-one-out error whatever the `selection`. Default: 2000.
     pub selection_runs: Option<usize>,
 }
 
@@ -264,12 +264,13 @@ impl PolynomialChaos {
             });
         }
         let runs = runs?;
+        let chosen_on = runs.min(self.selection_runs.unwrap_or(SELECTION_RUNS));
         if let Selection::KFold(folds) = self.selection
-            && folds > runs
+            && folds > chosen_on
         {
             return Some(Fault {
                 key: "selection",
-                message: format!("{runs} runs cannot be divided into {folds} parts"),
+                message: format!("{chosen_on} runs cannot be divided into {folds} parts"),
                 help: "5 or 10 parts are usual".to_owned(),
             });
         }

@@ -4,7 +4,7 @@ use lacuna::run::{Progress, Stop};
 use lacuna_linalg::Matrix;
 
 use super::PolynomialChaos;
-use super::output::{Output, outputs};
+use super::output::Output;
 use super::search::{Best, Search};
 use crate::surrogates::principal_components::{Components, PrincipalComponents};
 
@@ -32,40 +32,49 @@ impl PolynomialChaos {
     pub(super) fn reduction(&self, runs: usize, responses: &Matrix) -> Option<Reduction> {
         let outputs = responses.columns();
         let many = runs * outputs > MANY_VALUES && (runs > MANY_RUNS || outputs > MANY_OUTPUTS);
-        let stated = self.components.map(Reduction::Stated);
-        stated.or_else(|| many.then_some(Reduction::ByError))
+        match self.components {
+            Some(Components::None) => None,
+            Some(components) => Some(Reduction::Stated(components)),
+            None => many.then_some(Reduction::ByError),
+        }
     }
 }
 
 impl Reduction {
-    /// Returns the components of responses (`runs x outputs`): by error all that there are.
-    pub fn components(self, responses: &Matrix) -> Result<PrincipalComponents, Stop> {
-        match self {
-            Self::Stated(components) => components.of(responses),
-            Self::ByError => Components::Variance(1.0).of(responses),
-        }
-    }
-
-    /// Returns the components of responses (`runs x outputs`) and the best terms of each.
+    /// Chooses the components of responses (`runs x outputs`) and the terms of each; `scores_of` returns their scores as
+    /// outputs.
     pub fn chosen(
         self,
         responses: &Matrix,
+        scores_of: impl Fn(&PrincipalComponents) -> Vec<Output>,
         search: &Search<'_>,
         progress: &Progress<'_>,
-    ) -> Result<(PrincipalComponents, Vec<Option<Best>>), Stop> {
-        let all = self.components(responses)?;
-        let scores = outputs(&all.scores);
+    ) -> Result<Chosen, Stop> {
+        let wanted = match self {
+            Self::Stated(components) => components,
+            Self::ByError => Components::Variance(1.0),
+        };
+        let components = wanted.of(responses)?;
+        let mut scores = scores_of(&components);
         match self {
             Self::Stated(_) => {
                 let found = search.choose_all(&scores, progress)?;
-                Ok((all, found))
+                Ok(Chosen { components, scores, found })
             }
             Self::ByError => {
                 let found = until_little_is_left(&scores, search, progress)?;
-                Ok((all.first(found.len()), found))
+                scores.truncate(found.len());
+                Ok(Chosen { components: components.first(found.len()), scores, found })
             }
         }
     }
+}
+
+/// Components with their scores and the best terms of each.
+pub(super) struct Chosen {
+    pub components: PrincipalComponents,
+    pub scores: Vec<Output>,
+    pub found: Vec<Option<Best>>,
 }
 
 /// Chooses terms for blocks of components, in decreasing order of their variances, until the variance of the others is

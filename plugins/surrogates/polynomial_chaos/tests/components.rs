@@ -90,6 +90,11 @@ fn many_runs_of_many_outputs_have_components_by_default() {
         fitted(&of_degree(3), &BOX, &scaled(&unit, &BOX), &responses).unwrap()
     };
     assert!(of(1000).summary().reduction.is_none());
+    let outputs = PolynomialChaos { components: Some(Components::None), ..of_degree(3) };
+    let unit = latin_hypercube(1001, 2, 5);
+    let responses = Matrix::from_fn(1001, 1000, |i, o| response(unit.row(i), o % 40));
+    let each = fitted(&outputs, &BOX, &scaled(&unit, &BOX), &responses).unwrap();
+    assert!(each.summary().reduction.is_none());
     let many = of(1001);
     let reduction = many.summary().reduction.unwrap();
     assert!(reduction.components <= 64, "{reduction:?}");

@@ -5,7 +5,7 @@ use lacuna::plugin::{Emulator, Forward};
 use lacuna_linalg::{Matrix, least_squares};
 
 use super::bench::{BOREHOLE, ISHIGAMI, fitted, latin_hypercube, scaled, up_to};
-use crate::surrogates::polynomial_chaos::PolynomialChaos;
+use crate::surrogates::polynomial_chaos::{PolynomialChaos, Selection};
 
 /// Responses of Ishigami's function and a multiple of its square.
 fn responses(points: &Matrix) -> Matrix {
@@ -77,6 +77,39 @@ fn terms_of_a_part_predict_as_well_as_those_of_all_runs() {
         let stated = of_part.fit_error().relative[o];
         assert!((0.5..2.0).contains(&(stated / relative)), "{o}: {stated} {relative}");
     }
+}
+
+/// A response that no polynomial follows: the error that is stated is that at fresh points.
+#[test]
+fn the_error_of_a_step_is_stated() {
+    let step = |points: &Matrix| {
+        Matrix::from_fn(points.rows(), 1, |i, _| f64::from(u8::from(points[(i, 0)] > 1.0)))
+    };
+    let points = design(4000, 6);
+    let fit = fitted(&chosen_on(500), ISHIGAMI.ranges, &points, &step(&points)).unwrap();
+    assert!(fit.summary().part.unwrap().common);
+    let fresh = design(1000, 98);
+    let (truth, emulated) = (step(&fresh).column(0), fit.mean(&fresh).column(0));
+    let square: f64 = truth.iter().zip(&emulated).map(|(t, e)| (t - e).powi(2)).sum();
+    let mean = truth.iter().sum::<f64>() / 1000.0;
+    let relative = square / 1000.0 / (mean * (1.0 - mean));
+    let stated = fit.fit_error().relative[0];
+    assert!(relative > 0.01, "{relative}");
+    // A thousand points with a few hundred beside the step: the ratio is known to about a tenth.
+    assert!((0.7..1.4).contains(&(stated / relative)), "{stated} {relative}");
+}
+
+/// By cross-validation the terms are chosen with parts of the runs of the choice.
+#[test]
+fn cross_validation_chooses_on_a_part_too() {
+    let points = design(3000, 7);
+    let options = PolynomialChaos { selection: Selection::KFold(5), ..chosen_on(300) };
+    let fit = fitted(&options, ISHIGAMI.ranges, &points, &responses(&points)).unwrap();
+    assert_eq!(fit.summary().part.unwrap().runs, 300);
+    assert!(fit.fit_error().relative[0] < 1e-3, "{}", fit.fit_error().relative[0]);
+    let more = PolynomialChaos { selection: Selection::KFold(400), ..chosen_on(300) };
+    let stop = fitted(&more, ISHIGAMI.ranges, &points, &responses(&points)).unwrap_err();
+    assert!(stop.message.contains("300 runs cannot be divided into 400 parts"), "{stop}");
 }
 
 /// With too few runs for all terms together each output keeps its own terms, with coefficients of all runs.

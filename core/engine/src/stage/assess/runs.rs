@@ -216,7 +216,7 @@ fn suspicious(
     problem: &InverseProblem<'_>,
     ensemble: &Ensemble,
 ) -> Result<Vec<Finding>, Stop> {
-    let Some(fitted) = problem.fitted() else { return Ok(Vec::new()) };
+    let Some(learned) = problem.emulated() else { return Ok(Vec::new()) };
     // With runs that follow the data, those of the last fit are not those of the design.
     let follows = problem.refinement().is_some() || problem.region().is_some();
     let rows: Vec<usize> = if follows {
@@ -239,7 +239,7 @@ fn suspicious(
         Matrix::from_fn(raw.rows(), own.len(), |i, k| scale.unit(own[k], raw[(i, own[k])]));
     let left_out = (!follows).then(|| {
         let own: Vec<usize> = (0..rows.len()).collect();
-        left_out(&fitted.value, problem.emulator(), &own, &columns)
+        left_out(&learned.fitted.value, &*learned.emulator, &own, &columns)
     });
     let suspects = suspicious::suspects(&points, &responses, left_out.as_ref());
     let told = |suspect: &Suspect| {
@@ -270,13 +270,13 @@ fn suspicious(
 /// large they may be.
 fn left_out(
     fitted: &Fitted,
-    emulator: Option<&dyn Emulator>,
+    emulator: &dyn Emulator,
     runs: &[usize],
     outputs: &[usize],
 ) -> LeftOut {
     let known = fitted.sample_points.rows() - fitted.errors.validation;
     // Of thousands of runs the stage keeps the errors of some, the emulator those of all.
-    let all = emulator.map(|e| &e.fit_error().residuals).filter(|_| known < runs.len());
+    let all = (known < runs.len()).then(|| &emulator.fit_error().residuals);
     let stated = fitted.curves.stated.as_ref().filter(|_| all.is_none());
     let Some(stated) = stated else {
         let errors = all.unwrap_or(&fitted.samples).select(runs, outputs);

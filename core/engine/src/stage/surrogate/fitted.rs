@@ -22,7 +22,7 @@ pub struct Fitted {
     /// Errors of the emulator.
     pub errors: Errors,
     /// Errors of the emulator at runs it was not trained on, `runs x outputs`, in the unit of the response: the
-    /// leave-one-out errors of the training runs, then those of the validation runs.
+    /// leave-one-out errors of the training runs (of at most 5000, evenly spaced), then those of the validation runs.
     pub samples: Matrix,
     /// Parameters of those runs, `runs x parameters`.
     pub sample_points: Matrix,
