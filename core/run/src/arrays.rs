@@ -124,9 +124,9 @@ fn numbers(
         return Ok(values.iter().copied().collect::<Vec<f64>>().into());
     }
     let room = std::fs::metadata(path).map_err(|error| error.to_string())?.len() / 8;
-    let sizes = variable.dimensions().iter().map(|d| d.size);
-    let count = sizes.fold(Some(1_u64), |count, size| count?.checked_mul(size));
-    let count = count
+    let mut sizes = variable.dimensions().iter().map(|d| d.size);
+    let count = sizes
+        .try_fold(1_u64, u64::checked_mul)
         .filter(|count| *count <= room)
         .and_then(|count| usize::try_from(count).ok())
         .ok_or_else(|| format!("`{name}` is larger than the file"))?;
