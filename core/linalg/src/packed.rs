@@ -56,6 +56,19 @@ impl PackedUpper {
         self.size += 1;
     }
 
+    /// Removes all but the first `count` columns.
+    pub fn truncate(&mut self, count: usize) {
+        self.size = self.size.min(count);
+        let panels = self.size.div_ceil(LANES);
+        self.lanes.truncate(start(panels));
+        // The panel in which the matrix ends may hold columns that are removed.
+        let last = self.size / LANES;
+        let end = start(last) + self.size % LANES * (last + 1);
+        if let Some(removed) = self.lanes.get_mut(end..) {
+            removed.fill([0.0; LANES]);
+        }
+    }
+
     /// Writes `U U' x` to `product` and returns `|U' x|^2`, reading the matrix once. `x` is padded with zeros during
     /// the call.
     ///
@@ -175,6 +188,23 @@ mod tests {
             assert!(
                 (0..=n).all(|j| upper.column(j).iter().enumerate().all(|(i, u)| *u == entry(i, j)))
             );
+        }
+    }
+    #[test]
+    fn a_truncated_matrix_is_one_that_never_had_the_columns() {
+        let column = |n: usize| (0..=n).map(|i| ((3 * i + 7 * n) as f64).sin()).collect::<Vec<_>>();
+        for (size, count) in [(21, 0), (21, 8), (21, 11), (24, 16), (24, 23), (5, 9)] {
+            let [mut long, mut short] = [size, count.min(size)].map(|size| {
+                let mut upper = PackedUpper::new();
+                (0..size).for_each(|n| upper.push(&column(n)));
+                upper
+            });
+            long.truncate(count);
+            assert_eq!(long, short, "{count} of {size}");
+            let next = column(count.min(size));
+            long.push(&next);
+            short.push(&next);
+            assert_eq!(long, short);
         }
     }
 }

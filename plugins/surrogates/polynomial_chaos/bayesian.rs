@@ -108,7 +108,7 @@ pub(super) fn bayesian(
             (0..open.len()).filter(|&t| open[t]).max_by(|a, b| size(a).total_cmp(&size(b)))?;
         set.enter(strongest);
     }
-    Some(judged(&set, centred, criterion))
+    Some(judged(set, centred, criterion))
 }
 
 /// Posterior of the active weights and the two statistics of every term, in the notation of Tipping and Faul:

@@ -87,16 +87,14 @@ struct Near {
 }
 
 impl<'a> Candidates<'a> {
-    /// Returns all candidates at the start of the path; only columns that vary may enter at all.
-    pub fn new(dictionary: &'a Dictionary, correlations: &[f64]) -> Self {
+    /// Returns the candidates at a point of the path from their correlations with the residual there; `closed` is zero
+    /// for those that may enter and infinity for the others.
+    pub fn new(dictionary: &'a Dictionary, correlations: Vec<f64>, closed: Vec<f64>) -> Self {
         let n = correlations.len();
         Self {
             dictionary,
-            closed: dictionary
-                .varies()
-                .map(|open| if open { 0.0 } else { f64::INFINITY })
-                .collect(),
-            correlations: correlations.to_vec(),
+            closed,
+            correlations,
             rates: vec![0.0; n],
             scratch: vec![0.0; n],
             since: Since::default(),

@@ -82,12 +82,12 @@ impl Dictionary {
         }
     }
 
-    /// Writes `sum_i weights[i] * products(terms[i])` to `out`.
+    /// Writes the first entries of `sum_i weights[i] * products(terms[i])` to `out`.
     pub fn combine(&self, terms: &[usize], weights: &[f64], out: &mut [f64]) {
         self.gram.combine(&self.columns, terms, weights, out);
     }
 
-    /// Two combinations of the same rows of inner products.
+    /// Two combinations of the same rows of inner products, or of their first entries.
     pub fn combine_twice(&self, terms: &[usize], weights: [&[f64]; 2], out: [&mut [f64]; 2]) {
         self.gram.combine_twice(&self.columns, terms, weights, out);
     }
@@ -105,11 +105,38 @@ impl Dictionary {
         most.min(self.varies().filter(|varies| *varies).count())
     }
 
+    /// Returns the columns with these indices that vary over the runs.
+    pub fn subset(&self, members: &[usize]) -> Subset {
+        let end = members.iter().max().map_or(0, |last| last + 1);
+        let mut closed = vec![f64::INFINITY; end];
+        let open = members.iter().filter(|&&t| self.lengths[t] > 0.0);
+        open.for_each(|&t| closed[t] = 0.0);
+        Subset { closed }
+    }
+
     /// Returns the maximum number of terms of a greedy choice: half the number of runs, or of rows with slopes. Each greedy term also fits
     /// the noise that the previous ones have left, so that the leave-one-out error is misleading if there are nearly
     /// as many terms as runs.
     pub fn most_greedy_terms(&self) -> usize {
         self.most_terms().min((self.columns.height() / 2).max(1))
+    }
+}
+
+/// Columns of a dictionary from which a path may choose.
+pub(super) struct Subset {
+    /// Zero for each of these columns and infinity for the others, up to the last of them.
+    pub closed: Vec<f64>,
+}
+
+impl Subset {
+    /// Returns true if a column is one of these.
+    pub fn holds(&self, term: usize) -> bool {
+        self.closed.get(term).is_some_and(|closed| *closed == 0.0)
+    }
+
+    /// Returns the number of columns.
+    pub fn count(&self) -> usize {
+        self.closed.iter().filter(|closed| **closed == 0.0).count()
     }
 }
 
@@ -120,6 +147,8 @@ pub(super) struct ActiveSet<'a> {
     terms: Vec<usize>,
     /// The active columns (`active x rows`).
     columns: Matrix,
+    /// Orthonormal columns of the first terms, as far as they were asked for (`steps x rows`).
+    orthonormal: Matrix,
     /// Inverse `R^-1` of the Cholesky factor of the active Gram matrix `G = R' R`.
     inverse: PackedUpper,
     /// `tr (Psi' Psi)^-1` after each step, for the basis functions without standardisation and the constant.
@@ -135,6 +164,7 @@ impl<'a> ActiveSet<'a> {
             dictionary,
             terms: Vec::new(),
             columns: Matrix::zeros(0, dictionary.columns.height()),
+            orthonormal: Matrix::zeros(0, dictionary.columns.height()),
             inverse: PackedUpper::new(),
             traces: Vec::new(),
             products: Vec::new(),
@@ -200,14 +230,43 @@ impl<'a> ActiveSet<'a> {
             + if k == 0 { 0.0 } else { self.traces[k - 1] }
     }
 
-    /// Returns the orthonormal columns that the steps from `first` on added, one per row.
-    pub fn orthonormal(&self, first: usize) -> Matrix {
-        let k = self.terms.len();
-        let mut block = Matrix::zeros(k - first, k);
-        for i in first..k {
-            block.row_mut(i - first)[..=i].copy_from_slice(self.inverse.column(i));
+    /// Computes the orthonormal columns that the steps added, all those that are not known yet by one product.
+    pub fn orthonormalise(&mut self) {
+        let (known, k) = (self.orthonormal.rows(), self.terms.len());
+        if known == k {
+            return;
         }
-        multiply(&block, &self.columns)
+        let mut block = Matrix::zeros(k - known, k);
+        for i in known..k {
+            block.row_mut(i - known)[..=i].copy_from_slice(self.inverse.column(i));
+        }
+        let columns = multiply(&block, &self.columns);
+        columns.iter_rows().for_each(|column| self.orthonormal.push_row(column));
+    }
+
+    /// Returns the orthonormal column that step `i` added.
+    ///
+    /// # Panics
+    ///
+    /// If it has not been computed.
+    pub fn orthonormal(&self, i: usize) -> &[f64] {
+        self.orthonormal.row(i)
+    }
+
+    /// Removes all but the first `count` terms.
+    pub fn truncate(&mut self, count: usize) {
+        self.terms.truncate(count);
+        self.columns.truncate_rows(count);
+        self.orthonormal.truncate_rows(count);
+        self.inverse.truncate(count);
+        self.traces.truncate(count);
+    }
+
+    /// Returns `G^-1 x` with the Gram matrix `G` of the active columns.
+    pub fn solve_gram(&self, x: &[f64]) -> Vec<f64> {
+        let mut solution = Vec::new();
+        self.inverse.square_multiply(&mut x.to_vec(), &mut solution);
+        solution
     }
 
     /// Returns the least-squares weights of the active columns for an output with these products with all columns,

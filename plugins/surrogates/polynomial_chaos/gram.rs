@@ -49,14 +49,15 @@ impl Gram {
         }
     }
 
-    /// Writes `sum_i weights[i] * row(terms[i])` to `out`.
+    /// Writes the first entries of `sum_i weights[i] * row(terms[i])` to `out`.
     pub fn combine(&self, columns: &Columns, terms: &[usize], weights: &[f64], out: &mut [f64]) {
         match self {
             Self::Whole(matrix) => vector::combine_rows(matrix, terms, weights, out),
             Self::Rows(_) => {
                 out.fill(0.0);
                 for (&term, &weight) in terms.iter().zip(weights) {
-                    vector::add_scaled(out, weight, self.row(columns, term));
+                    let row = &self.row(columns, term)[..out.len()];
+                    vector::add_scaled(out, weight, row);
                 }
             }
         }

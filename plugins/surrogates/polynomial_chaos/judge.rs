@@ -78,8 +78,8 @@ pub(super) trait Path<'a> {
     /// Adds the next term; returns false if there is none.
     fn step(&mut self) -> bool;
 
-    /// Returns the terms so far.
-    fn active(&self) -> &ActiveSet<'a>;
+    /// Returns the terms so far, which may be some already before the first step.
+    fn active(&mut self) -> &mut ActiveSet<'a>;
 }
 
 /// Returns the best least-squares fit along a path for one output, given as its values minus their mean.
@@ -95,20 +95,20 @@ pub(super) fn best_along<'a>(
 ) -> Option<Choice> {
     let mut judge = Judge::new(centred, criterion);
     let mut best: Option<(f64, usize)> = None;
-    'path: while path.active().terms().len() < most {
-        let first = path.active().terms().len();
+    let mut first = 0;
+    'path: while first < most {
         // A block ends no later than the path is known to continue, so that no step is wasted.
         let known = best.map_or(usize::MAX, |(_, at)| at.saturating_add(window));
         let end = most.min(first + BLOCK).min(known);
         while path.active().terms().len() < end && path.step() {}
         let active = path.active();
-        if active.terms().len() == first {
+        let last = end.min(active.terms().len());
+        if last <= first {
             break;
         }
-        let orthonormal = active.orthonormal(first);
-        for (i, column) in orthonormal.iter_rows().enumerate() {
-            let k = first + i + 1;
-            judge.add(column);
+        active.orthonormalise();
+        for k in first + 1..=last {
+            judge.add(active.orthonormal(k - 1));
             let error = judge.error(active.trace(k));
             if best.is_none_or(|(least, _)| error < least) {
                 best = Some((error, k));
@@ -117,14 +117,16 @@ pub(super) fn best_along<'a>(
                 break 'path;
             }
         }
+        first = last;
     }
     best.map(|(error, k)| Choice { terms: path.active().terms()[..k].to_vec(), error })
 }
 
 /// Assesses the least-squares fit on a whole set of terms.
-pub(super) fn judged(active: &ActiveSet<'_>, centred: &[f64], criterion: &Criterion) -> Choice {
+pub(super) fn judged(mut active: ActiveSet<'_>, centred: &[f64], criterion: &Criterion) -> Choice {
     let mut judge = Judge::new(centred, criterion);
-    active.orthonormal(0).iter_rows().for_each(|column| judge.add(column));
+    active.orthonormalise();
+    (0..active.terms().len()).for_each(|i| judge.add(active.orthonormal(i)));
     let terms = active.terms().to_vec();
     Choice { error: judge.error(active.trace(terms.len())), terms }
 }

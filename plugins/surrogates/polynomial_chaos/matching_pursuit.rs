@@ -66,7 +66,7 @@ impl<'a> Path<'a> for MatchingPursuit<'a> {
         false
     }
 
-    fn active(&self) -> &ActiveSet<'a> {
-        &self.active
+    fn active(&mut self) -> &mut ActiveSet<'a> {
+        &mut self.active
     }
 }

@@ -21,6 +21,7 @@ mod measure;
 mod options;
 mod output;
 mod part;
+mod paths;
 mod quadrature;
 mod recurrence;
 mod reduction;
@@ -346,4 +347,4 @@ impl Surrogate for PolynomialChaos {
     }
 }
 
-lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"], revision = 3);
+lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"], revision = 4);

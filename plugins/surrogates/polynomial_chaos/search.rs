@@ -13,7 +13,6 @@ use super::coordinate::Coordinate;
 use super::dictionary::Dictionary;
 use super::gram::Gram;
 use super::judge::{Choice, Criterion, best_along};
-use super::least_angle::LeastAngle;
 use super::least_squares::{Fit, Regression};
 use super::matching_pursuit::MatchingPursuit;
 use super::options::Solver;
@@ -40,13 +39,24 @@ pub(super) struct Best {
     pub terms: Vec<usize>,
 }
 
+impl Best {
+    /// The constant and the other terms of a set that a solver chose.
+    pub fn new(set: &TermSet, error: f64, others: impl Iterator<Item = usize>) -> Self {
+        let mut terms = vec![set.members[0]];
+        terms.extend(others);
+        terms.sort_unstable();
+        Self { error, degree: set.degree, q_norm: set.q_norm, terms }
+    }
+}
+
 /// Best fit of one output so far.
 #[derive(Debug, Clone, Default)]
-struct State {
-    best: Option<Best>,
+pub(super) struct State {
+    pub best: Option<Best>,
     /// Number of consecutive degrees that were worse than the best.
     worse: usize,
-    done: bool,
+    /// True if no further degree is tried.
+    pub done: bool,
     /// Best fit among the norms of the present degree.
     of_degree: Option<Best>,
     worse_norms: usize,
@@ -66,13 +76,17 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Returns the best terms of each output, as [`Self::run`], and fails if there are none for an output that varies.
+    /// Returns the best terms of each output: `None` for outputs that do not vary. Fails if there are none for an output
+    /// that varies.
     pub fn choose_all(
         &self,
         outputs: &[Output],
         progress: &Progress<'_>,
     ) -> Result<Vec<Option<Best>>, Stop> {
-        let found = self.run(outputs, progress)?;
+        let found = match self.options.solver {
+            Solver::LeastAngleRegression => self.along_paths(outputs, progress),
+            _ => self.set_by_set(outputs, progress)?,
+        };
         if outputs.iter().zip(&found).any(|(o, best)| o.variance > 0.0 && best.is_none()) {
             return Err(Stop::new(
                 "the responses vary over the runs, but no basis function does so with them",
@@ -84,7 +98,11 @@ impl Search<'_> {
 
     /// Tries one set after the other for all outputs that still improve. `None` for outputs that do not vary, or with
     /// which no basis function varies.
-    fn run(&self, outputs: &[Output], progress: &Progress<'_>) -> Result<Vec<Option<Best>>, Stop> {
+    fn set_by_set(
+        &self,
+        outputs: &[Output],
+        progress: &Progress<'_>,
+    ) -> Result<Vec<Option<Best>>, Stop> {
         let mut states = vec![State::default(); outputs.len()];
         for (state, output) in states.iter_mut().zip(outputs) {
             state.done = output.variance == 0.0;
@@ -98,11 +116,8 @@ impl Search<'_> {
                 break;
             }
             for set in of_degree.iter().filter(|set| self.is_possible(set)) {
-                let active: Vec<usize> = tried
-                    .iter()
-                    .copied()
-                    .filter(|&o| states[o].worse_norms < WORSE_NORMS)
-                    .collect();
+                let active: Vec<usize> =
+                    tried.iter().copied().filter(|&o| states[o].tries_norms()).collect();
                 for (&o, found) in active.iter().zip(self.on_set(set, outputs, &active)?) {
                     states[o].take_norm(found);
                 }
@@ -167,24 +182,31 @@ impl Search<'_> {
         }
     }
 
-    fn sparse(&self, set: &TermSet, outputs: &[Output], active: &[usize]) -> Vec<Option<Best>> {
-        let runs = self.points.rows();
+    /// Returns the basis functions of some terms at the runs, for fits of this number of outputs.
+    pub fn dictionary(&self, members: &[usize], outputs: usize) -> Dictionary {
         // Sparse Bayesian learning follows the statistics of every term.
         let whole = self.options.solver == Solver::BayesianCompressiveSensing
-            || Gram::needs_all(set.members.len(), runs, active.len());
-        let basis = self.basis(&set.members);
+            || Gram::needs_all(members.len(), self.points.rows(), outputs);
+        let basis = self.basis(members);
         let slopes = self.slopes.map(|slopes| slopes.columns(&basis, self.points));
-        let dictionary = Dictionary::new(&basis.values(self.points), slopes, whole);
+        Dictionary::new(&basis.values(self.points), slopes, whole)
+    }
+
+    /// Returns the values of some outputs, with their slopes if these are known, minus their means (`outputs x rows`).
+    pub fn centred(&self, outputs: &[Output], which: &[usize]) -> Matrix {
+        let runs = self.points.rows();
         let rows = self.slopes.map_or(runs, |slopes| runs * (1 + slopes.dimension()));
-        let centred = Matrix::from_rows(rows, active.iter().map(|&o| &outputs[o].centred));
+        Matrix::from_rows(rows, which.iter().map(|&o| &outputs[o].centred))
+    }
+
+    fn sparse(&self, set: &TermSet, outputs: &[Output], active: &[usize]) -> Vec<Option<Best>> {
+        let dictionary = self.dictionary(&set.members, active.len());
+        let centred = self.centred(outputs, active);
         let correlations = dictionary.correlations(&centred);
         let parts = Parts::default();
         let best = |i: usize| {
             let choice = self.choose(&dictionary, &parts, centred.row(i), correlations.row(i))?;
-            let mut terms = vec![set.members[0]];
-            terms.extend(choice.terms.iter().map(|&t| set.members[t]));
-            terms.sort_unstable();
-            Some(Best { error: choice.error, degree: set.degree, q_norm: set.q_norm, terms })
+            Some(Best::new(set, choice.error, choice.terms.iter().map(|&t| set.members[t])))
         };
         (0..active.len()).into_par_iter().map(best).collect()
     }
@@ -200,11 +222,6 @@ impl Search<'_> {
         let criterion = self.criterion;
         let window = self.options.early_stop.window(self.points.rows());
         match self.options.solver {
-            Solver::OrthogonalMatchingPursuit => {
-                let mut path = MatchingPursuit::new(dictionary, correlations);
-                let most = dictionary.most_greedy_terms();
-                best_along(&mut path, centred, criterion, most, window)
-            }
             Solver::SubspacePursuit => {
                 subspace_pursuit(dictionary, centred, correlations, criterion)
             }
@@ -212,8 +229,9 @@ impl Search<'_> {
                 bayesian(dictionary, parts, centred, correlations, criterion)
             }
             _ => {
-                let mut path = LeastAngle::new(dictionary, correlations);
-                best_along(&mut path, centred, criterion, dictionary.most_terms(), window)
+                let mut path = MatchingPursuit::new(dictionary, correlations);
+                let most = dictionary.most_greedy_terms();
+                best_along(&mut path, centred, criterion, most, window)
             }
         }
     }
@@ -263,8 +281,13 @@ fn dependent() -> Stop {
 }
 
 impl State {
+    /// Returns true if further norms of the present degree are tried.
+    pub fn tries_norms(&self) -> bool {
+        self.worse_norms < WORSE_NORMS
+    }
+
     /// Compares the fit with a further norm with the best of this degree.
-    fn take_norm(&mut self, found: Option<Best>) {
+    pub fn take_norm(&mut self, found: Option<Best>) {
         let least = self.of_degree.as_ref().map_or(f64::INFINITY, |b| b.error);
         match found {
             Some(found) if self.of_degree.is_none() || found.error < least => {
@@ -276,7 +299,7 @@ impl State {
     }
 
     /// Compares the best fit of a further degree with the best so far.
-    fn take_degree(&mut self, patience: usize) {
+    pub fn take_degree(&mut self, patience: usize) {
         self.worse_norms = 0;
         let least = self.best.as_ref().map_or(f64::INFINITY, |b| b.error);
         match self.of_degree.take() {

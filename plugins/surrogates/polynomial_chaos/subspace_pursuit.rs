@@ -34,7 +34,7 @@ pub(super) fn subspace_pursuit(
             if set.terms().is_empty() {
                 return f64::INFINITY;
             }
-            let choice = judged(&set, centred, criterion);
+            let choice = judged(set, centred, criterion);
             let error = choice.error;
             Choice::improve(best, choice);
             error

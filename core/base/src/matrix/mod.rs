@@ -165,6 +165,12 @@ impl Matrix {
         (self.rows, self.columns) = (0, columns);
     }
 
+    /// Removes all but the first `count` rows.
+    pub fn truncate_rows(&mut self, count: usize) {
+        self.rows = self.rows.min(count);
+        self.data.truncate(self.rows * self.columns);
+    }
+
     /// Appends a row from its entries.
     ///
     /// # Panics

@@ -141,18 +141,19 @@ impl WithSimd for TakeOut<'_> {
     }
 }
 
-/// Writes the linear combination `sum_i weights[i] * matrix.row(rows[i])` to `out`.
+/// Writes the first entries of the linear combination `sum_i weights[i] * matrix.row(rows[i])` to `out`, as many as it has.
 ///
 /// # Panics
-/// If the number of weights differs from that of rows, or `out` is not as long as a row.
+/// If the number of weights differs from that of rows, or `out` is longer than a row.
 pub fn combine_rows(matrix: &Matrix, rows: &[usize], weights: &[f64], out: &mut [f64]) {
     combine_rows_of(matrix, rows, [weights], [out]);
 }
 
-/// Two linear combinations of the same rows, in little more time than one: reading the rows dominates the cost.
+/// Two linear combinations of the same rows or of their first entries, in little more time than one: reading the rows
+/// dominates the cost.
 ///
 /// # Panics
-/// If the number of weights differs from that of rows, or the outputs are not as long as a row.
+/// If the number of weights differs from that of rows, or an output is longer than a row.
 pub fn combine_rows_twice(
     matrix: &Matrix,
     rows: &[usize],
@@ -170,7 +171,7 @@ fn combine_rows_of<const M: usize>(
 ) {
     for m in 0..M {
         assert_eq!(rows.len(), weights[m].len(), "one weight a row");
-        assert_eq!(matrix.columns(), out[m].len(), "a combination has the length of a row");
+        assert!(out[m].len() <= matrix.columns(), "a combination has at most the length of a row");
         out[m].fill(0.0);
     }
     Arch::new().dispatch(CombineRows { matrix, rows, weights, out });
@@ -256,5 +257,8 @@ mod tests {
         assert_eq!(second, out);
         combine_rows(&m, &rows, &[0.5; 6], &mut out);
         assert_eq!(first, out);
+        let mut beginning = [f64::NAN; 3];
+        combine_rows(&m, &rows, &[0.5; 6], &mut beginning);
+        assert_eq!(beginning, out[..3]);
     }
 }

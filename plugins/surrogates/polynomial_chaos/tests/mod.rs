@@ -12,5 +12,6 @@ mod laws;
 mod many_inputs;
 mod many_runs;
 mod options;
+mod paths;
 mod solvers;
 mod textbook;

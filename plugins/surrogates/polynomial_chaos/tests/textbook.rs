@@ -14,7 +14,7 @@ use crate::surrogates::polynomial_chaos::least_angle::LeastAngle;
 use crate::surrogates::polynomial_chaos::matching_pursuit::MatchingPursuit;
 use crate::surrogates::polynomial_chaos::{EarlyStop, Expansion, PolynomialChaos, Solver};
 
-type Rows = Vec<Vec<f64>>;
+pub(super) type Rows = Vec<Vec<f64>>;
 
 /// Returns `A^-1` by Gauss-Jordan elimination with row pivoting.
 fn inverse(a: &Rows) -> Rows {
@@ -62,7 +62,7 @@ fn legendre(n: usize, z: f64) -> f64 {
     ((2 * n + 1) as f64).sqrt() * (0..=n / 2).map(term).sum::<f64>() / 2.0_f64.powi(n as i32)
 }
 
-fn basis(exponents: &[Vec<u16>], unit: &Matrix) -> Rows {
+pub(super) fn basis(exponents: &[Vec<u16>], unit: &Matrix) -> Rows {
     let value = |point: &[f64], e: &Vec<u16>| {
         point.iter().zip(e).map(|(u, &n)| legendre(usize::from(n), 2.0 * u - 1.0)).product()
     };
@@ -174,7 +174,7 @@ fn leave_one_out_residuals_are_those_of_runs_really_left_out() {
 
 /// Returns the order in which terms enter, from the definition: at each step the equiangular vector of the active
 /// columns through an explicit inverse, and the residual itself.
-fn slow_path(psi: &Rows, y: &[f64], steps: usize) -> Vec<usize> {
+pub(super) fn slow_path(psi: &Rows, y: &[f64], steps: usize) -> Vec<usize> {
     let n = y.len();
     let standardised: Rows = transpose(psi)
         .into_iter()
@@ -269,7 +269,8 @@ fn terms_enter_in_the_order_of_the_explicit_path_when_there_are_more_terms_than_
         let mean = y.iter().sum::<f64>() / 150.0;
         let centred: Vec<f64> = y.iter().map(|v| v - mean).collect();
         let correlations = multiply_vector(dictionary.columns(), &centred);
-        let mut path = LeastAngle::new(&dictionary, &correlations);
+        let all = dictionary.subset(&(0..exponents.len()).collect::<Vec<_>>());
+        let mut path = LeastAngle::new(&dictionary, &all, &correlations);
         let choice =
             best_along(&mut path, &centred, &Criterion::LeaveOneOut, 148, usize::MAX).unwrap();
         assert!(choice.terms.len() > 25, "only {} terms", choice.terms.len());
