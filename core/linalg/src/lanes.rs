@@ -55,6 +55,50 @@ impl WithSimd for SparseMultiply<'_> {
     }
 }
 
+/// Sparse sums of products with a table: `out[r] = sum_k factors[k] table[columns[k]]` for `k` in
+/// `starts[r]..starts[r + 1]`, each point with its own factors.
+///
+/// # Panics
+/// If the numbers of columns and factors differ, `starts` does not fit `out`, or a column is not in the table.
+pub fn sparse_products(
+    starts: &[usize],
+    columns: &[u16],
+    factors: &[Lanes],
+    table: &[Lanes],
+    out: &mut [Lanes],
+) {
+    assert_eq!(columns.len(), factors.len(), "one column a factor");
+    assert_eq!(starts.len(), out.len() + 1, "one row an output");
+    Arch::new().dispatch(SparseProducts { starts, columns, factors, table, out });
+}
+
+struct SparseProducts<'a> {
+    starts: &'a [usize],
+    columns: &'a [u16],
+    factors: &'a [Lanes],
+    table: &'a [Lanes],
+    out: &'a mut [Lanes],
+}
+
+impl WithSimd for SparseProducts<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (out, bounds) in self.out.iter_mut().zip(self.starts.windows(2)) {
+            let range = bounds[0]..bounds[1];
+            let mut sums = [0.0; LANES];
+            for (factor, &column) in self.factors[range.clone()].iter().zip(&self.columns[range]) {
+                let values = &self.table[usize::from(column)];
+                for l in 0..LANES {
+                    sums[l] += factor[l] * values[l];
+                }
+            }
+            *out = sums;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -72,6 +116,14 @@ mod tests {
             assert_eq!(out[0][l], 2.0 * entry(4) - entry(1));
             assert_eq!(out[1][l], 0.0);
             assert_eq!(out[2][l], 0.5 * entry(0) + 3.0 * entry(2) + entry(3));
+        }
+        let factors = [4, 0, 2, 2, 1].map(|c: usize| table[c]);
+        sparse_products(&starts, &columns, &factors, &table, &mut out);
+        for l in 0..LANES {
+            let entry = |c: usize| table[c][l];
+            assert_eq!(out[0][l], entry(4) * entry(4) + entry(0) * entry(1));
+            assert_eq!(out[1][l], 0.0);
+            assert_eq!(out[2][l], entry(2) * entry(0) + entry(2) * entry(2) + entry(1) * entry(3));
         }
     }
 }

@@ -13,6 +13,7 @@ use lacuna::plugin::discrepancy::Compressed;
 use lacuna::plugin::forward::{Linear, SumOfSquares};
 use lacuna_linalg::Matrix;
 use lacuna_linalg::vector::dot;
+use rayon::prelude::*;
 
 use super::law::Law;
 use super::likelihood::GaussianLikelihood;
@@ -105,14 +106,16 @@ impl CompressedGaussian {
 
     fn values(&self, residuals: &[Residuals], hyper: &Matrix) -> Vec<f64> {
         let spreads = self.spreads();
-        let mut at_point = Vec::with_capacity(residuals.len());
         let one = |i: usize| {
-            at_point.clear();
-            at_point.extend(
-                residuals.iter().map(|r| Residual { outside: r.squares[i], along: r.along.row(i) }),
-            );
+            let each = residuals.iter();
+            let at_point: Vec<Residual<'_>> =
+                each.map(|r| Residual { outside: r.squares[i], along: r.along.row(i) }).collect();
             self.law.log_likelihood(&spreads, hyper.row(i), &at_point)
         };
+        // Coupled groups take a factorisation at each point.
+        if matches!(self.law, Law::Coupled(_)) {
+            return (0..hyper.rows()).into_par_iter().map(one).collect();
+        }
         (0..hyper.rows()).map(one).collect()
     }
 }

@@ -8,7 +8,7 @@
 
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::forward::SumOfSquares;
-use lacuna_linalg::lanes::{LANES, Lanes, sparse_multiply};
+use lacuna_linalg::lanes::{LANES, Lanes, sparse_multiply, sparse_products};
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Matrix, gram, multiply_vector};
 
@@ -158,15 +158,7 @@ impl Squares {
         for i in (0..last).rev() {
             let Level { starts, exponents } = &self.levels[i];
             let (outer, inner) = sums.split_at_mut(i + 1);
-            for (sum, bounds) in outer[i].iter_mut().zip(starts.windows(2)) {
-                *sum = [0.0; LANES];
-                for k in bounds[0]..bounds[1] {
-                    let (value, psi) = (&inner[0][k], &tables[i][usize::from(exponents[k])]);
-                    for l in 0..LANES {
-                        sum[l] += value[l] * psi[l];
-                    }
-                }
-            }
+            sparse_products(starts, exponents, &inner[0], &tables[i], &mut outer[i]);
         }
     }
 }

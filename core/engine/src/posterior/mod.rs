@@ -24,6 +24,7 @@ mod joint;
 mod members;
 mod mode;
 mod of_data;
+mod pace;
 mod scales;
 
 pub use conditional::CutValues;
@@ -35,6 +36,7 @@ pub use of_data::OfData;
 pub use scales::CoordinateScale;
 
 use members::{Jacobian, Members};
+use pace::Pace;
 
 /// Number of points that are evaluated together. It is fixed because the rounding of a matrix product depends on the
 /// number of its rows, and results must not depend on the number of threads.
@@ -77,6 +79,7 @@ pub struct Posterior<'a> {
     region: Option<Vec<(f64, f64)>>,
     members: Members<'a>,
     numbers: Numbers,
+    pace: Pace,
 }
 
 impl<'a> Posterior<'a> {
@@ -85,7 +88,8 @@ impl<'a> Posterior<'a> {
         let prior = prior.into();
         let members = Members::of(prior.dependence());
         let numbers = Numbers::OfPoint;
-        Self { prior, likelihood: Arc::new(likelihood), region: None, members, numbers }
+        let (likelihood, pace) = (Arc::new(likelihood), Pace::default());
+        Self { prior, likelihood, region: None, members, numbers, pace }
     }
 
     /// The same density, estimated with these random numbers.
@@ -102,7 +106,8 @@ impl<'a> Posterior<'a> {
 
     fn with_members(&self, members: Members<'a>) -> Self {
         let (prior, likelihood) = (self.prior, self.likelihood.clone());
-        Self { prior, likelihood, region: self.region.clone(), members, numbers: self.numbers }
+        let (region, numbers, pace) = (self.region.clone(), self.numbers, Pace::default());
+        Self { prior, likelihood, region, members, numbers, pace }
     }
 
     /// The same density in coordinates whose members are centred to these degrees, from 0 to 1 and in the order of
@@ -218,13 +223,15 @@ impl<'a> Posterior<'a> {
 
     fn batch(&self, points: &Matrix, jacobian: bool) -> Vec<f64> {
         let starts: Vec<usize> = (0..points.rows()).step_by(BATCH).collect();
-        let parts: Vec<Vec<f64>> = starts
-            .into_par_iter()
-            .map(|start| {
-                let rows: Vec<usize> = (start..points.rows().min(start + BATCH)).collect();
-                self.block(&points.select_rows(&rows), jacobian)
-            })
-            .collect();
+        let part = |start: usize| {
+            let rows: Vec<usize> = (start..points.rows().min(start + BATCH)).collect();
+            self.pace.of(rows.len(), || self.block(&points.select_rows(&rows), jacobian))
+        };
+        let parts: Vec<Vec<f64>> = if self.pace.is_short(points.rows()) {
+            starts.into_iter().map(part).collect()
+        } else {
+            starts.into_par_iter().map(part).collect()
+        };
         parts.concat()
     }
 
