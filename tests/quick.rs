@@ -147,8 +147,8 @@ pub fn results(out: &Path) -> BTreeMap<String, String> {
         }
         for entry in fs::read_dir(&folder).unwrap() {
             let path = entry.unwrap().path();
-            // Notes that executors keep for themselves.
-            if path.file_name().is_some_and(|name| name == "campaign") {
+            // Notes that executors keep for themselves, and the folders in which commands ran.
+            if path.is_dir() {
                 continue;
             }
             let file = path.file_name().unwrap().to_string_lossy().into_owned();

@@ -3,6 +3,7 @@
 mod example;
 mod import;
 mod jobs;
+mod moved;
 mod nodes;
 mod processes;
 mod queue;

@@ -68,9 +68,14 @@ impl Server {
 
     /// Options that name the command and the server.
     fn options(&self) -> String {
+        self.inline().replace(", ", "\n") + "\n"
+    }
+
+    /// These options in the braces of an inline table.
+    pub fn inline(&self) -> String {
         let folder = self.folder();
         format!(
-            "command = \"{}\"\nserver = \"{}\"\npoll = 1\npatience = 1\n",
+            "command = \"{}\", server = \"{}\", poll = 1, patience = 1",
             folder.join("hq").display(),
             folder.display()
         )
