@@ -1,6 +1,6 @@
 """Time and memory of whole runs against their size: runs, outputs, parameters, walkers, measured points.
 
-    cargo build --release && python3 bench/scaling.py [AXIS ...]
+    cargo build --release && python3 bench/scaling.py [AXIS | AXIS=SIZE ...]
 
 Writes one line for each size: wall time, peak memory of the process, memory of the largest table, and the exponent of
 the time between this size and the one before (1: proportional). The simulator is a formula, so that the time is that of
@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 
-LACUNA = os.environ.get("LACUNA", "target/release/lacuna")
+LACUNA = os.path.abspath(os.environ.get("LACUNA", "target/release/lacuna"))
 
 STUDY = """
 [study]
@@ -114,11 +114,14 @@ SIZES = {"runs": "runs", "outputs": "outputs", "parameters": "parameters", "walk
 
 
 def main():
-    for axis in sys.argv[1:] or AXES:
+    for wanted in sys.argv[1:] or AXES:
+        axis, _, only = wanted.partition("=")
         print(f"| {axis} | wall time [s] | peak memory [MiB] | table of runs [MiB] | exponent of the time |")
         print("|---|---|---|---|---|")
         before = None
         for case in AXES[axis]:
+            if only and case[SIZES[axis]] != int(only):
+                continue
             with tempfile.TemporaryDirectory() as folder:
                 folder = pathlib.Path(folder)
                 study(folder, **case)
@@ -134,4 +137,5 @@ def main():
             before = (size, seconds)
 
 
-main()
+if __name__ == "__main__":
+    main()
