@@ -34,8 +34,8 @@ const TOO_MANY: &str = "log_likelihood and posterior_predictive are omitted: eve
                         draws gives more than ten million values";
 
 impl Given<'_> {
-    /// Bytes of the file.
-    pub fn encode(&self) -> Result<Vec<u8>, Error> {
+    /// Bytes of the file. The largest tables are given up as soon as they are in the file under construction.
+    pub fn encode(mut self) -> Result<Vec<u8>, Error> {
         let version = env!("CARGO_PKG_VERSION");
         let mut attributes = vec![
             ("title", self.study.about.title.as_str()),
@@ -134,7 +134,7 @@ impl Given<'_> {
 
     /// Writes the groups that are arranged like the data; returns the dimensions of the predictions, if there are any.
     fn of_data(
-        &self,
+        &mut self,
         file: &mut File,
         cells: &Cells<'_>,
     ) -> Result<Option<[DimensionId; 2]>, Error> {
@@ -144,14 +144,17 @@ impl Given<'_> {
         let unit = Some(unit.as_str());
         let place = cells.place(file, "observed_data")?;
         place.variable(file, &format!("observed_data/{name}"), &[], &cells.values(), unit)?;
-        if let Some(from) = &self.from_posterior {
+        if let Some(from) = &mut self.from_posterior {
             let place = cells.place(file, PREDICTIVE)?;
             let draws = chosen(file, PREDICTIVE, from)?;
             dimensions = Some(draws);
             let path = format!("{PREDICTIVE}/{name}");
-            place.variable(file, &path, &draws, from.data.as_slice(), unit)?;
+            let data = std::mem::take(&mut from.data);
+            place.variable(file, &path, &draws, data.as_slice(), unit)?;
+            drop(data);
+            let densities = from.log_likelihood.take();
             self.band(file, &place)?;
-            if let Some(densities) = &from.log_likelihood {
+            if let (Some(densities), Some(from)) = (densities, &self.from_posterior) {
                 let place = cells.place(file, "log_likelihood")?;
                 let draws = chosen(file, "log_likelihood", from)?;
                 let path = format!("log_likelihood/{name}");
@@ -167,11 +170,11 @@ impl Given<'_> {
             let place = cells.place(file, PREDICTIVE)?;
             self.band(file, &place)?;
         }
-        if let Some((numbers, data)) = &self.from_prior.data {
+        if let Some((numbers, data)) = self.from_prior.data.take() {
             let group = "prior_predictive";
             let place = cells.place(file, group)?;
             let chain = file.counted(group, "chain", &[0])?.0;
-            let draw = file.counted(group, "draw", numbers)?.0;
+            let draw = file.counted(group, "draw", &numbers)?.0;
             let path = format!("{group}/{name}");
             place.variable(file, &path, &[chain, draw], data.as_slice(), unit)?;
         }
