@@ -23,36 +23,7 @@ pub fn sparse_multiply(
     table: &[Lanes],
     out: &mut [Lanes],
 ) {
-    assert_eq!(columns.len(), weights.len(), "one column a weight");
-    assert_eq!(starts.len(), out.len() + 1, "one row an output");
-    Arch::new().dispatch(SparseMultiply { starts, columns, weights, table, out });
-}
-
-struct SparseMultiply<'a> {
-    starts: &'a [usize],
-    columns: &'a [u16],
-    weights: &'a [f64],
-    table: &'a [Lanes],
-    out: &'a mut [Lanes],
-}
-
-impl WithSimd for SparseMultiply<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        for (out, bounds) in self.out.iter_mut().zip(self.starts.windows(2)) {
-            let range = bounds[0]..bounds[1];
-            let mut sums = [0.0; LANES];
-            for (weight, &column) in self.weights[range.clone()].iter().zip(&self.columns[range]) {
-                let values = &self.table[usize::from(column)];
-                for l in 0..LANES {
-                    sums[l] += weight * values[l];
-                }
-            }
-            *out = sums;
-        }
-    }
+    sums(starts, columns, weights, table, out);
 }
 
 /// Sparse sums of products with a table: `out[r] = sum_k factors[k] table[columns[k]]` for `k` in
@@ -67,20 +38,49 @@ pub fn sparse_products(
     table: &[Lanes],
     out: &mut [Lanes],
 ) {
-    assert_eq!(columns.len(), factors.len(), "one column a factor");
-    assert_eq!(starts.len(), out.len() + 1, "one row an output");
-    Arch::new().dispatch(SparseProducts { starts, columns, factors, table, out });
+    sums(starts, columns, factors, table, out);
 }
 
-struct SparseProducts<'a> {
+/// Factor of a row of the table: one number, or one of each point.
+trait Factor {
+    fn at(&self, lane: usize) -> f64;
+}
+
+impl Factor for f64 {
+    #[inline(always)]
+    fn at(&self, _: usize) -> f64 {
+        *self
+    }
+}
+
+impl Factor for Lanes {
+    #[inline(always)]
+    fn at(&self, lane: usize) -> f64 {
+        self[lane]
+    }
+}
+
+fn sums<F: Factor>(
+    starts: &[usize],
+    columns: &[u16],
+    factors: &[F],
+    table: &[Lanes],
+    out: &mut [Lanes],
+) {
+    assert_eq!(columns.len(), factors.len(), "one column a factor");
+    assert_eq!(starts.len(), out.len() + 1, "one row an output");
+    Arch::new().dispatch(SparseSums { starts, columns, factors, table, out });
+}
+
+struct SparseSums<'a, F> {
     starts: &'a [usize],
     columns: &'a [u16],
-    factors: &'a [Lanes],
+    factors: &'a [F],
     table: &'a [Lanes],
     out: &'a mut [Lanes],
 }
 
-impl WithSimd for SparseProducts<'_> {
+impl<F: Factor> WithSimd for SparseSums<'_, F> {
     type Output = ();
 
     #[inline(always)]
@@ -91,7 +91,7 @@ impl WithSimd for SparseProducts<'_> {
             for (factor, &column) in self.factors[range.clone()].iter().zip(&self.columns[range]) {
                 let values = &self.table[usize::from(column)];
                 for l in 0..LANES {
-                    sums[l] += factor[l] * values[l];
+                    sums[l] += factor.at(l) * values[l];
                 }
             }
             *out = sums;

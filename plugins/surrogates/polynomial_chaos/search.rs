@@ -211,7 +211,7 @@ impl Search<'_> {
         (0..active.len()).into_par_iter().map(best).collect()
     }
 
-    /// Returns the solver's choice for one output.
+    /// Returns the choice of a solver that takes each set by itself, for one output.
     fn choose(
         &self,
         dictionary: &Dictionary,

@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 /// Time of a batch below which waking another thread costs more than it saves.
 const SHORT: Duration = Duration::from_micros(100);
 
-/// Time that the last block of points took. It decides where densities are computed, never their values.
+/// Time that the last blocks of points took. It decides where densities are computed, never their values.
 #[derive(Debug, Default)]
 pub struct Pace {
-    /// Nanoseconds a point; zero as long as nothing was measured.
+    /// Nanoseconds a point, those of the slowest of the last blocks; zero as long as nothing was measured.
     nanoseconds: AtomicU64,
 }
 
@@ -25,7 +25,10 @@ impl Pace {
         let begun = Instant::now();
         let computed = compute();
         let each = begun.elapsed().as_nanos() / points.max(1) as u128;
-        self.nanoseconds.store(u64::try_from(each).unwrap_or(u64::MAX).max(1), Ordering::Relaxed);
+        let each = u64::try_from(each).unwrap_or(u64::MAX).max(1);
+        // A block outside the prior takes no time and says nothing of the next one.
+        let before = self.nanoseconds.load(Ordering::Relaxed);
+        self.nanoseconds.store(each.max(before - before / 4), Ordering::Relaxed);
         computed
     }
 }
@@ -42,5 +45,9 @@ mod tests {
         assert!(pace.is_short(1));
         pace.of(1, || std::thread::sleep(Duration::from_millis(1)));
         assert!(!pace.is_short(1));
+        pace.of(1000, || ());
+        assert!(!pace.is_short(1), "one fast block after a slow one");
+        (0..40).for_each(|_| pace.of(1000, || ()));
+        assert!(pace.is_short(1));
     }
 }

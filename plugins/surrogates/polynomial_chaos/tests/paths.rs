@@ -79,6 +79,37 @@ fn paths_among_more_terms_begin_with_what_they_share() {
     }
 }
 
+/// On runs at three levels of each parameter the functions of degree three and above repeat those below, so that the level
+/// meets candidates that do not enter.
+#[test]
+fn candidates_that_repeat_others_are_shared_as_well() {
+    let exponents = exponents();
+    let unit = Matrix::from_fn(27, 3, |i, j| (i / 3_usize.pow(j as u32) % 3) as f64 / 2.0);
+    let psi = basis(&exponents, &unit);
+    let dictionary = Dictionary::new(&Matrix::from_rows(exponents.len(), &psi), None, true);
+    let mut rng = Stream::root(3).generator();
+    let y: Vec<f64> = (0..27).map(|_| normal(&mut rng)).collect();
+    let mean = y.iter().sum::<f64>() / 27.0;
+    let centred: Vec<f64> = y.iter().map(|v| v - mean).collect();
+    let correlations = multiply_vector(dictionary.columns(), &centred);
+    let subsets: Vec<_> =
+        (1..10).map(|p| dictionary.subset(&members(&exponents, p, 1.0))).collect();
+    let mut before = LeastAngle::new(&dictionary, &subsets[0], &correlations);
+    for subset in &subsets {
+        let error = |path: &mut LeastAngle<'_>| {
+            let choice = best_along(path, &centred, &Criterion::LeaveOneOut, 20, usize::MAX);
+            (choice.as_ref().map(|c| c.terms.len()), choice.map(|c| c.error))
+        };
+        before = before.among(subset);
+        let (count, shared) = error(&mut before);
+        let (alone, own) = error(&mut LeastAngle::new(&dictionary, subset, &correlations));
+        // Functions that repeat each other may take each other's place; the fit is the same.
+        assert_eq!(count, alone);
+        let (shared, own) = (shared.unwrap(), own.unwrap());
+        assert!((shared / own - 1.0).abs() < 1e-9, "{shared} {own}");
+    }
+}
+
 #[test]
 fn sets_need_not_contain_each_other() {
     let exponents = exponents();
