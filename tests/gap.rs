@@ -36,3 +36,4 @@ mod term_laws;
 mod terms;
 mod two_masses;
 mod workflow;
+mod yeast;

@@ -59,6 +59,8 @@ pub struct Events {
 struct Current {
     stage: String,
     total: u64,
+    /// True if the total is an estimate.
+    about: bool,
     begun: Instant,
     spoken: Instant,
 }
@@ -73,7 +75,8 @@ impl Observer for Events {
     fn begin(&self, stage: &str, unit: &str, total: u64) {
         write(&json!({ "event": "begin", "stage": stage, "unit": unit, "total": total }));
         let now = Instant::now();
-        let current = Current { stage: stage.to_owned(), total, begun: now, spoken: now };
+        let current =
+            Current { stage: stage.to_owned(), total, about: false, begun: now, spoken: now };
         self.with(|slot| *slot = Some(current));
     }
 
@@ -85,10 +88,19 @@ impl Observer for Events {
             }
             current.spoken = Instant::now();
             let seconds = current.begun.elapsed().as_secs_f64();
-            let (stage, total) = (&current.stage, current.total);
+            let Current { stage, total, about, .. } = current;
             write(&json!({
-                "event": "progress", "stage": stage, "done": done, "total": total, "seconds": seconds
+                "event": "progress", "stage": stage, "done": done, "total": total, "about": about,
+                "seconds": seconds
             }));
+        });
+    }
+
+    fn expect(&self, total: u64) {
+        self.with(|slot| {
+            if let Some(current) = slot {
+                (current.total, current.about) = (total, true);
+            }
         });
     }
 

@@ -28,6 +28,8 @@ struct Current {
     stage: String,
     unit: String,
     total: u64,
+    /// True if the total is an estimate.
+    about: bool,
     bar: Option<ProgressBar>,
     begun: Instant,
     /// Number of units done at the first report: taken from an earlier run, so they do not count for the rate.
@@ -70,6 +72,7 @@ impl Observer for Terminal {
             stage: stage.to_owned(),
             unit: unit.to_owned(),
             total,
+            about: false,
             bar,
             begun: now,
             first: None,
@@ -87,6 +90,17 @@ impl Observer for Terminal {
             } else if !self.interactive && current.spoken.elapsed() > INTERVAL {
                 current.spoken = Instant::now();
                 tell(&plain_line(current, first, done));
+            }
+        });
+    }
+
+    fn expect(&self, total: u64) {
+        self.with(|slot| {
+            let Some(current) = slot else { return };
+            (current.total, current.about) = (total, true);
+            if let Some(bar) = &current.bar {
+                bar.set_style(style(&current.stage, &current.unit, true));
+                bar.set_length(total);
             }
         });
     }
@@ -110,13 +124,22 @@ impl Observer for Terminal {
     }
 }
 
-fn bar(stage: &str, unit: &str, total: u64) -> ProgressBar {
-    let template =
-        format!("{stage:<10} [{{bar:30}}] {{pos}}/{{len}} {unit}s, {{per_sec}}, {{eta}} left");
-    let style = ProgressStyle::with_template(&template)
+/// The line of a stage whose total is known, or about known.
+fn style(stage: &str, unit: &str, about: bool) -> ProgressStyle {
+    let template = if about {
+        format!(
+            "{stage:<10} [{{bar:30}}] {{pos}} of about {{len}} {unit}s, {{per_sec}}, about {{eta}} left"
+        )
+    } else {
+        format!("{stage:<10} [{{bar:30}}] {{pos}}/{{len}} {unit}s, {{per_sec}}, {{eta}} left")
+    };
+    ProgressStyle::with_template(&template)
         .unwrap_or_else(|_| ProgressStyle::default_bar())
-        .progress_chars("=> ");
-    let bar = ProgressBar::new(total).with_style(style);
+        .progress_chars("=> ")
+}
+
+fn bar(stage: &str, unit: &str, total: u64) -> ProgressBar {
+    let bar = ProgressBar::new(total).with_style(style(stage, unit, false));
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
 }
@@ -133,7 +156,7 @@ fn counter(stage: &str, unit: &str) -> ProgressBar {
 fn plain_line(current: &Current, first: u64, done: u64) -> String {
     let seconds = current.begun.elapsed().as_secs_f64();
     let rate = done.saturating_sub(first) as f64 / seconds.max(1e-9);
-    let Current { stage, unit, total, .. } = current;
+    let Current { stage, unit, total, about, .. } = current;
     if rate == 0.0 {
         return format!("{stage}: {done}/{total} {unit}s");
     }
@@ -142,5 +165,44 @@ fn plain_line(current: &Current, first: u64, done: u64) -> String {
         return format!("{stage}: {done} {unit}s, {rate:.1} {unit}s/s");
     }
     let left = (total - done) as f64 / rate;
+    if *about {
+        return format!(
+            "{stage}: {done} of about {total} {unit}s, {rate:.1} {unit}s/s, about {left:.0} s left"
+        );
+    }
     format!("{stage}: {done}/{total} {unit}s, {rate:.1} {unit}s/s, {left:.0} s left")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_tells_the_time_that_is_left_and_whether_that_is_an_estimate() {
+        let begun =
+            Instant::now().checked_sub(Duration::from_secs(10)).unwrap_or_else(Instant::now);
+        let of = |total, about| Current {
+            stage: "gap".to_owned(),
+            unit: "evaluation".to_owned(),
+            total,
+            about,
+            bar: None,
+            begun,
+            first: None,
+            spoken: begun,
+        };
+        let line = |total, about, done| plain_line(&of(total, about), 0, done);
+        assert!(line(300, false, 100).starts_with("gap: 100/300 evaluations, "));
+        assert!(
+            line(300, false, 100).ends_with("evaluations/s, 20 s left"),
+            "{}",
+            line(300, false, 100)
+        );
+        let about = line(300, true, 100);
+        assert!(about.starts_with("gap: 100 of about 300 evaluations, "), "{about}");
+        assert!(about.ends_with(", about 20 s left"), "{about}");
+        // More than was estimated: nothing is known of the rest.
+        assert!(line(300, true, 400).ends_with("evaluations/s"));
+        assert!(line(0, false, 400).starts_with("gap: 400 evaluations, "));
+    }
 }

@@ -40,6 +40,7 @@ class Display:
         self.live = in_notebook() or getattr(self.out, "isatty", lambda: False)()
         self.width = 0
         self.stage, self.unit, self.total = "", "", 0
+        self.about = False
         self.begun = time.monotonic()
         self.first: tuple[int, float] | None = None
 
@@ -47,10 +48,12 @@ class Display:
         """Show an event."""
         if kind == "begin":
             self.stage, self.unit, self.total = details
-            self.begun, self.first = time.monotonic(), None
+            self.begun, self.first, self.about = time.monotonic(), None, False
             self._show(self.stage)
         elif kind == "advance":
             self._show(self._line(details[0]))
+        elif kind == "expect":
+            (self.total,), self.about = details, True
         elif kind == "end":
             stage, note = details
             self._say(f"{stage:<10} {time.monotonic() - self.begun:8.2f} s   {note}")
@@ -72,11 +75,12 @@ class Display:
             self.first = (done, now)
         if not self.total or done > self.total:
             return f"{self.stage:<10} {done} {self.unit}s"
-        line = f"{self.stage:<10} {done}/{self.total} {self.unit}s"
+        of, about = (" of about ", "about ") if self.about else ("/", "")
+        line = f"{self.stage:<10} {done}{of}{self.total} {self.unit}s"
         before, since = self.first
         if done > before and now > since:
             left = (self.total - done) * (now - since) / (done - before)
-            line += f", {duration(left)} left"
+            line += f", {about}{duration(left)} left"
         return line
 
     def _show(self, line: str) -> None:

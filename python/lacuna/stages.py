@@ -47,8 +47,9 @@ def run(
         Run directory. Default: ``runs/NAME`` with the name of the study.
     progress
         True for a progress bar (in notebooks a line that is updated), False for none, or a function that is called
-        with each event: ``("begin", stage, unit, total)``, ``("advance", done)``, ``("end", stage, note)``,
-        ``("warning", text)``, ``("note", text)``, ``("remark", text)``.
+        with each event: ``("begin", stage, unit, total)``, ``("advance", done)``, ``("expect", total)``
+        (an estimate of a total that is not known), ``("end", stage, note)``, ``("warning", text)``,
+        ``("note", text)``, ``("remark", text)``.
     overrides
         Keys of the study, with two underscores for a point: ``sampler__steps=200``.
 

@@ -14,6 +14,8 @@ pub enum Event {
     Begin(String, String, u64),
     /// Number of units that are done.
     Advance(u64),
+    /// Estimate of the number of units of a stage that began with zero.
+    Expect(u64),
     /// A stage ends: name and result in a few words.
     End(String, String),
     /// A warning, a note or a remark.
@@ -67,6 +69,10 @@ impl Observer for Channel {
         if due || self.interrupted.load(Ordering::Relaxed) {
             self.send(Event::Advance(done));
         }
+    }
+
+    fn expect(&self, total: u64) {
+        self.send(Event::Expect(total));
     }
 
     fn end(&self, stage: &str, note: &str) {

@@ -70,6 +70,7 @@ fn listen(
         match py.detach(next) {
             Ok(Event::Begin(stage, unit, total)) => tell.call1(("begin", stage, unit, total))?,
             Ok(Event::Advance(done)) => tell.call1(("advance", done))?,
+            Ok(Event::Expect(total)) => tell.call1(("expect", total))?,
             Ok(Event::End(stage, note)) => tell.call1(("end", stage, note))?,
             Ok(Event::Say(kind, text)) => tell.call1((kind, text))?,
             Err(RecvTimeoutError::Timeout) => {

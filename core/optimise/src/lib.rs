@@ -2,6 +2,7 @@
 
 mod bounded;
 mod laplace;
+mod linearised;
 mod scatter;
 
 use lacuna_base::math::Target;
@@ -55,36 +56,45 @@ const PASSES: usize = 6;
 /// The distinct maxima of a log density within its bounds, reached from the rows of `starts` (`starts x dimension`),
 /// the largest first.
 ///
-/// Each start is followed by L-BFGS-B (Byrd, Lu, Nocedal and Zhu 1995) in coordinates scaled by the curvature of the
+/// A density with a [linearised form](Target::linearised) is climbed by the Gauss-Newton method first. Each start is
+/// followed by L-BFGS-B (Byrd, Lu, Nocedal and Zhu 1995) in coordinates scaled by the curvature of the
 /// density, or by the bounds and the spread of the starts if there is none, so that unknowns of order 1e6 and 1e-10 can
 /// be combined. Points where the density is zero or undefined turn the search back. Starts at such points are dropped:
 /// without a start inside the support the result is empty. Maxima closer to each other than a tenth of a standard
 /// deviation are merged.
 pub fn maximise(target: &dyn Target, starts: &Matrix) -> Vec<Optimum> {
     let regions = regions(target, starts);
-    let found: Vec<Option<Optimum>> = (0..starts.rows())
+    let risen: Vec<Option<Ascended>> = (0..starts.rows())
         .into_par_iter()
-        .map(|row| climb(target, starts.row(row), &regions))
+        .map(|row| rise(target, starts.row(row), &regions))
         .collect();
-    let mut found: Vec<Optimum> = found.into_iter().flatten().collect();
+    let risen = distinct(risen.into_iter().flatten().collect());
+    let polished: Vec<Ascended> =
+        risen.into_par_iter().map(|from| polish(target, from, &regions)).collect();
+    let bounds = target.bounds();
+    distinct(polished).into_iter().map(|ascended| ascended.optimum(&bounds)).collect()
+}
+
+/// Points in falling order of the density, without those that an ascent left at a maximum where another one is.
+fn distinct(mut found: Vec<Ascended>) -> Vec<Ascended> {
     found.sort_by(|a, b| {
         // Equal values are ordered by their coordinates, so that the result does not depend on the order of the starts.
         let by_point =
             || a.point.iter().zip(&b.point).map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne());
         b.value.total_cmp(&a.value).then_with(|| by_point().unwrap_or(std::cmp::Ordering::Equal))
     });
-    let mut distinct: Vec<(Optimum, Vec<f64>)> = Vec::new();
-    for optimum in found {
-        let near = |(better, scales): &(Optimum, Vec<f64>)| {
-            let pairs = better.point.iter().zip(&optimum.point);
-            pairs.zip(scales).all(|((x, y), scale)| (x - y).abs() <= 0.1 * scale)
+    let mut distinct: Vec<Ascended> = Vec::new();
+    for ascended in found {
+        let near = |better: &Ascended| {
+            let pairs = better.point.iter().zip(&ascended.point);
+            better.is_top
+                && pairs.zip(&better.scales).all(|((x, y), scale)| (x - y).abs() <= 0.1 * scale)
         };
-        if !distinct.iter().any(near) {
-            let scales = laplace::scales(target, &optimum.point, &regions);
-            distinct.push((optimum, scales));
+        if !(ascended.is_top && distinct.iter().any(near)) {
+            distinct.push(ascended);
         }
     }
-    distinct.into_iter().map(|(optimum, _)| optimum).collect()
+    distinct
 }
 
 /// The maximum of a log density that one search by L-BFGS-B reaches from a start, in coordinates of known scales;
@@ -147,34 +157,70 @@ fn regions(target: &dyn Target, starts: &Matrix) -> Vec<Region> {
     target.bounds().into_iter().enumerate().map(region).collect()
 }
 
-/// Follows one start upwards; `None` if the density is zero at the start.
-fn climb(target: &dyn Target, start: &[f64], regions: &[Region]) -> Option<Optimum> {
+/// Point that an ascent has reached, with the density there.
+struct Ascended {
+    point: Vec<f64>,
+    value: f64,
+    gradient: Vec<f64>,
+    /// Standard deviation of each coordinate given the others.
+    scales: Vec<f64>,
+    /// Evaluations of the density and its gradient since the start.
+    evaluations: usize,
+    /// False if the ascent has yet to begin.
+    is_top: bool,
+}
+
+impl Ascended {
+    fn gradient_norm(&self, bounds: &[(f64, f64)]) -> f64 {
+        gradient_norm(&self.point, &self.gradient, bounds, &self.scales)
+    }
+
+    fn optimum(self, bounds: &[(f64, f64)]) -> Optimum {
+        let gradient_norm = self.gradient_norm(bounds);
+        let converged = gradient_norm <= CONVERGED;
+        let Self { point, value, evaluations, .. } = self;
+        Optimum { point, value, gradient_norm, converged, evaluations }
+    }
+}
+
+/// Follows one start upwards by linearised densities, if there are any; `None` if the density is zero at the start.
+fn rise(target: &dyn Target, start: &[f64], regions: &[Region]) -> Option<Ascended> {
     let bounds = target.bounds();
     let clamped = start.iter().zip(&bounds).map(|(x, (lo, hi))| x.max(*lo).min(*hi));
-    let mut point: Vec<f64> = clamped.collect();
-    let (mut value, mut gradient) = target.gradient(&point);
-    let mut evaluations = 1;
+    let point: Vec<f64> = clamped.collect();
+    if let Some(ascended) = linearised::ascend(target, &point, regions) {
+        return Some(ascended);
+    }
+    let (value, gradient) = target.gradient(&point);
     if !value.is_finite() || gradient.iter().any(|g| !g.is_finite()) {
         return None;
     }
-    let mut scales = laplace::scales(target, &point, regions);
+    let scales = laplace::scales(target, &point, regions);
+    Some(Ascended { point, value, gradient, scales, evaluations: 1, is_top: false })
+}
+
+/// Follows L-BFGS-B until the gradient is negligible, unless an ascent has made it small already.
+fn polish(target: &dyn Target, mut at: Ascended, regions: &[Region]) -> Ascended {
+    let bounds = target.bounds();
+    if at.is_top && at.gradient_norm(&bounds) <= CONVERGED {
+        return at;
+    }
     for _ in 0..PASSES {
-        let reached = Scaled::new(target, &point, &scales).maximise(value, &gradient, FINEST);
-        evaluations += reached.evaluations;
-        let gain = reached.value - value;
+        let reached =
+            Scaled::new(target, &at.point, &at.scales).maximise(at.value, &at.gradient, FINEST);
+        at.evaluations += reached.evaluations;
+        let gain = reached.value - at.value;
         if gain >= 0.0 {
-            (point, value, gradient) = (reached.point, reached.value, reached.gradient);
+            (at.point, at.value, at.gradient) = (reached.point, reached.value, reached.gradient);
         }
-        scales = laplace::scales(target, &point, regions);
-        let small = gradient_norm(&point, &gradient, &bounds, &scales) < 1e-3 * CONVERGED;
+        at.scales = laplace::scales(target, &at.point, regions);
+        let small = at.gradient_norm(&bounds) < 1e-3 * CONVERGED;
         // Below this gain the rounding of the density hides any further improvement.
-        if small || gain <= 1e-13 * value.abs() {
+        if small || gain <= 1e-13 * at.value.abs() {
             break;
         }
     }
-    let gradient_norm = gradient_norm(&point, &gradient, &bounds, &scales);
-    let converged = gradient_norm <= CONVERGED;
-    Some(Optimum { point, value, gradient_norm, converged, evaluations })
+    Ascended { is_top: true, ..at }
 }
 
 /// Norm of the scaled gradient without the components that press against a bound.

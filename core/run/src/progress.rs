@@ -26,6 +26,9 @@ pub struct Present {
     pub done: u64,
     /// Number of units in all; zero if it is not known.
     pub total: u64,
+    /// True if that number is an estimate.
+    #[serde(default)]
+    pub about: bool,
     /// Time at which the stage began, in seconds since 1970 (UTC).
     pub begun: u64,
     /// Time at which this was written, in seconds since 1970 (UTC).
@@ -139,11 +142,16 @@ impl Observer for Recorded<'_> {
         self.observer.advance(done);
     }
 
+    fn expect(&self, total: u64) {
+        self.change(|present| (present.total, present.about) = (total, true));
+        self.observer.expect(total);
+    }
+
     fn end(&self, stage: &str, text: &str) {
         self.change(|present| {
             note(&mut present.ended, EndedStage { stage: stage.to_owned(), note: text.to_owned() });
             (present.stage, present.unit) = (String::new(), String::new());
-            (present.done, present.total) = (0, 0);
+            (present.done, present.total, present.about) = (0, 0, false);
         });
         self.observer.end(stage, text);
     }
@@ -192,11 +200,16 @@ mod tests {
         recorded.warn("run 7 has no answer");
         recorded.warn("run 7 has no answer");
         recorded.end("simulate", "39 of 40");
+        recorded.begin("gap", "evaluation", 0);
+        recorded.expect(900);
+        assert_eq!((read().total, read().about), (900, true));
+        recorded.end("gap", "nothing is missing");
         recorded.begin("surrogate", "", 0);
         let present = read();
+        assert_eq!((present.total, present.about), (0, false));
         assert_eq!((present.stage.as_str(), present.done), ("surrogate", 0));
         assert_eq!(present.warnings, ["run 7 has no answer"]);
-        assert_eq!((present.ended.len(), present.ended[0].note.as_str()), (1, "39 of 40"));
+        assert_eq!((present.ended.len(), present.ended[0].note.as_str()), (2, "39 of 40"));
         recorded.finish::<()>(&Err(Stop::new("the disk is full")));
         assert_eq!(read().stopped.as_deref(), Some("the disk is full"));
         Recorded::new(folder.path(), &Silent).finish(&Ok(()));

@@ -206,6 +206,10 @@ impl Likelihood for GaussianLikelihood {
         Some(values(data).map(one).collect())
     }
 
+    fn is_cheap(&self) -> bool {
+        self.normal.is_none()
+    }
+
     fn compress(&self, linear: &dyn Linear) -> Option<Box<dyn Compressed>> {
         Some(Box::new(CompressedGaussian::new(self, linear).ok()?))
     }

@@ -258,6 +258,10 @@ impl Likelihood for StatedLikelihood {
         solved.map_or(f64::NEG_INFINITY, |solved| solved.log_likelihood)
     }
 
+    fn is_cheap(&self) -> bool {
+        self.normal.factor.columns() == 0 && self.sets.iter().all(|set| set.rotation.is_none())
+    }
+
     fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (mut by_response, mut by_hyper) = (vec![0.0; response.len()], vec![0.0; hyper.len()]);
         let Some(variance) = self.variances(hyper) else { return (by_response, by_hyper) };

@@ -147,6 +147,10 @@ impl Likelihood for Proportional {
         solved.map(|s| s.log_likelihood).filter(|l| !l.is_nan()).unwrap_or(f64::NEG_INFINITY)
     }
 
+    fn is_cheap(&self) -> bool {
+        self.normal.factor.columns() == 0
+    }
+
     fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let nothing = || (vec![0.0; response.len()], vec![0.0; hyper.len()]);
         let parts = self.values(hyper).zip(self.variance(response, hyper));

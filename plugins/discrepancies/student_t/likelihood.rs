@@ -186,6 +186,10 @@ impl Likelihood for StudentLikelihood {
         if value.is_nan() { f64::NEG_INFINITY } else { value }
     }
 
+    fn is_cheap(&self) -> bool {
+        true
+    }
+
     fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (mut by_mean, mut by_hyper) = (vec![0.0; response.len()], vec![0.0; hyper.len()]);
         let Some(at) = self.at(response, hyper) else { return (by_mean, by_hyper) };

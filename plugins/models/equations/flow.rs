@@ -4,6 +4,7 @@ use std::cell::RefCell;
 
 use lacuna::expression::{DIRECTIONS, Evaluator, Program};
 
+use super::jacobian::Jacobian;
 use super::system::System;
 
 /// Replacement for a rate that is not finite: so large that every method rejects the step and tries a shorter one.
@@ -25,6 +26,8 @@ struct Work<'s> {
     /// Components of several directions by coordinate, and the slopes of each rate along them.
     directions: Vec<[f64; DIRECTIONS]>,
     slopes: Vec<[f64; DIRECTIONS]>,
+    /// Derivatives of the rates by channels and states, if they take fewer operations than slopes along the sensitivities.
+    jacobian: Option<Jacobian>,
     /// Last rate that was not finite.
     undefined: Option<Undefined>,
 }
@@ -48,13 +51,15 @@ impl<'s> Flow<'s> {
         let mut point = vec![0.0; coordinates];
         let variables = system.variables.len();
         point[variables..variables + inputs.len()].copy_from_slice(inputs);
-        let rates = Evaluator::new(&system.rates);
+        let mut rates = Evaluator::new(&system.rates);
+        let jacobian = Jacobian::new(&mut rates, system, channels);
         let work = Work {
             rates,
             point,
             direction: vec![0.0; coordinates],
             directions: vec![[0.0; DIRECTIONS]; coordinates],
             slopes: vec![[0.0; DIRECTIONS]; system.states.len()],
+            jacobian,
             undefined: None,
         };
         Self { system, inputs, channels, work: RefCell::new(work) }
@@ -145,7 +150,10 @@ impl<'s> Flow<'s> {
         }
         let mut work = self.work.borrow_mut();
         let first = work.direction.len() - count;
-        let Work { rates: evaluator, directions, slopes, .. } = &mut *work;
+        let Work { rates: evaluator, directions, slopes, jacobian, .. } = &mut *work;
+        if jacobian.as_mut().is_some_and(|j| j.apply(evaluator, sensitivities, their_rates)) {
+            return;
+        }
         let some = sensitivities.chunks(DIRECTIONS * count);
         let both = some.zip(their_rates.chunks_mut(DIRECTIONS * count));
         for (chunk, (sensitivities, rates)) in both.enumerate() {
@@ -190,7 +198,7 @@ impl Work<'_> {
 
 /// Replaces a slope that is not finite by zero: either the rate is not finite there, or the slope is infinite at the
 /// edge of the domain of the rate.
-fn defined(slope: f64) -> f64 {
+pub(super) fn defined(slope: f64) -> f64 {
     if slope.is_finite() { slope } else { 0.0 }
 }
 

@@ -4,6 +4,7 @@ mod amend;
 mod check;
 mod flow;
 mod integrate;
+mod jacobian;
 mod kept;
 mod options;
 mod respond;
@@ -231,4 +232,4 @@ impl Gradient for Equations {
     }
 }
 
-lacuna::register!(Model, "equations", Equations, aliases: ["ode", "odes"], revision = 2);
+lacuna::register!(Model, "equations", Equations, aliases: ["ode", "odes"], revision = 3);

@@ -5,6 +5,7 @@ use lacuna::math::random::Stream;
 use lacuna::math::transform::Unconstrained;
 use lacuna::plugin::Target;
 use lacuna_linalg::{Cholesky, Matrix, symmetric_eigen};
+use rayon::prelude::*;
 
 /// Initial covariance (`d x d`, free coordinates) and the number of gradients it took.
 pub(crate) struct Curvature {
@@ -28,8 +29,9 @@ pub(crate) fn covariance(target: &Unconstrained<'_>, places: &[&[f64]]) -> Curva
     let d = target.dimension();
     let widths = widths(target, places);
     let (mut sum, mut count, mut gradients) = (Matrix::zeros(d, d), 0.0, 0);
-    for place in places.iter().take(MOST_PLACES) {
-        let (curvature, spent) = at(target, place, &widths);
+    let some = &places[..places.len().min(MOST_PLACES)];
+    let found: Vec<_> = some.par_iter().map(|place| at(target, place, &widths)).collect();
+    for (curvature, spent) in found {
         gradients += spent;
         if let Some(curvature) = curvature {
             count += 1.0;

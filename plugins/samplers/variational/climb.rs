@@ -15,6 +15,9 @@ use super::{Fit, Path, Point, Progress};
 
 /// Minimum gain of the quadratic model, in units of log density; a path ends below it.
 const LEAST_GAIN: f64 = 1e-6;
+/// Gain of a step below which a path ends, too: a density whose model is integrated numerically has no more digits, and
+/// draws are corrected by their weights.
+const NUMERICAL: f64 = 1e-3;
 /// Number of draws to estimate an evidence lower bound.
 const DRAWS: usize = 20;
 /// Constants of the weak Wolfe conditions: sufficient increase, and decrease of the slope.
@@ -40,8 +43,9 @@ pub(super) fn iterate(
     let Some(next) = found else { return (Progress { moved: false, evaluations }, false) };
     update(&mut path.inverse, &path.point, &next);
     let moved = next.place != path.point.place;
+    let on = next.value - path.point.value >= NUMERICAL;
     path.point = next;
-    (Progress { moved, evaluations }, moved)
+    (Progress { moved, evaluations }, on)
 }
 
 /// Keeps the normal approximation at the present point if its evidence lower bound is the largest so far; returns the

@@ -227,7 +227,7 @@ impl Sampler for Variational {
     }
 }
 
-lacuna::register!(Sampler, "variational", Variational, aliases: ["vi", "advi"]);
+lacuna::register!(Sampler, "variational", Variational, aliases: ["vi", "advi"], revision = 2);
 
 #[cfg(test)]
 mod tests;

@@ -146,3 +146,44 @@ fn options_that_make_no_sense_are_refused() {
     }
     assert_eq!(complaints_about::<Variational>("refine = false"), "");
 }
+
+/// A density that is known to few digits, and whose values with derivatives have another error than those without, as of an
+/// equation that is integrated numerically.
+struct Rounded<T>(T);
+
+impl<T: Target> Target for Rounded<T> {
+    fn dimension(&self) -> usize {
+        self.0.dimension()
+    }
+    fn log_density(&self, points: &Matrix) -> Vec<f64> {
+        let off = |x: &[f64]| 1e-4 * (1e6 * x[0]).sin();
+        self.0
+            .log_density(points)
+            .into_iter()
+            .zip(points.iter_rows())
+            .map(|(l, x)| l + off(x))
+            .collect()
+    }
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        self.0.log_prior(points)
+    }
+    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
+        let (value, slopes) = self.0.gradient(point);
+        (value - 0.2, slopes)
+    }
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.0.bounds()
+    }
+    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
+        self.0.prior_draws(count, stream)
+    }
+}
+
+#[test]
+fn paths_end_where_only_numerical_errors_are_left() {
+    let sampler = Variational::default();
+    let (harvest, evaluations) = reap(&sampler, &Rounded(bounded()), 2);
+    let exact = reap(&sampler, &bounded(), 2).1;
+    assert!(harvest.doubts.is_empty(), "{:?}", harvest.doubts);
+    assert!(evaluations < 2 * exact, "{evaluations}, and {exact} without errors");
+}

@@ -242,6 +242,12 @@ pub trait Likelihood: Send + Sync {
     /// Derivatives of the log-likelihood by the response and by the hyperparameters.
     fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>);
 
+    /// True if value and gradient take a number of operations proportional to the number of data, so that they can be
+    /// computed many times for each response of the model.
+    fn is_cheap(&self) -> bool {
+        false
+    }
+
     /// This likelihood as a function of the basis functions of a linear emulator, at a cost that does not grow with the
     /// number of data; `None` if the discrepancy has no such form.
     fn compress(&self, _linear: &dyn Linear) -> Option<Box<dyn Compressed>> {

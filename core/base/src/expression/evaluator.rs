@@ -1,5 +1,6 @@
 //! Evaluation of one program at many points in turn, without allocation.
 
+use super::adjoint::Adjoint;
 use super::operator::Lanes;
 use super::program::Program;
 use super::tape::Tape;
@@ -36,6 +37,8 @@ pub struct Evaluator<'p> {
     registers: Vec<Lanes<1>>,
     tangents: Vec<Lanes<1>>,
     wide: Vec<Lanes<DIRECTIONS>>,
+    /// The backward passes of [`Evaluator::derivatives`].
+    adjoint: Option<Adjoint>,
     /// True if there has been a point.
     filled: bool,
 }
@@ -54,6 +57,7 @@ impl<'p> Evaluator<'p> {
             registers: vec![[0.0]; registers],
             tangents: vec![[0.0]; tangents],
             wide: vec![[0.0; DIRECTIONS]; tangents],
+            adjoint: None,
             filled: false,
         }
     }
@@ -107,6 +111,31 @@ impl<'p> Evaluator<'p> {
         let Self { program, tape, registers, wide, .. } = self;
         let (lanes, out) = (directions.iter().copied(), out.iter_mut());
         along(program, tape, registers, wide, lanes, out, |out, slopes| *out = slopes);
+    }
+
+    /// Prepares [`Evaluator::derivatives`] by the unknowns that are wanted, and returns for each value the unknowns among
+    /// them on which it depends. `None` if the slopes along one direction for each of the `directions` of interest take
+    /// fewer operations, or if the program has vectors.
+    pub fn prepare(&mut self, wanted: &[bool], directions: usize) -> Option<Vec<Vec<usize>>> {
+        let tape = self.tape.as_ref()?;
+        let adjoint = tape.adjoint(wanted);
+        // One pass along several directions takes about twice as long as one along a single direction.
+        if adjoint.cost() > 2 * tape.steps() * directions.div_ceil(DIRECTIONS) {
+            return None;
+        }
+        let constants = tape.constants();
+        let of_row = |row: &[usize]| row.iter().map(|i| i - constants).collect();
+        let pattern = adjoint.pattern().map(of_row).collect();
+        self.adjoint = Some(adjoint);
+        Some(pattern)
+    }
+
+    /// Writes the derivatives of the values at the point by the unknowns that [`Evaluator::prepare`] returned for them, value
+    /// by value; nothing if it returned none.
+    pub fn derivatives(&mut self, out: &mut [f64]) {
+        if let (Some(tape), Some(adjoint)) = (&mut self.tape, &mut self.adjoint) {
+            tape.pull(adjoint, out);
+        }
     }
 }
 

@@ -37,6 +37,7 @@
 //! the nodes; `hypot` and `atan2` have slope 0 at the origin. An argument that does not contribute to a result has
 //! slope zero.
 
+mod adjoint;
 mod breaks;
 mod compile;
 mod curve;

@@ -5,6 +5,7 @@
 //! which it depends has changed. Values and derivatives are those of [`forward`](super::forward) and
 //! [`tangent`](super::tangent), bit by bit.
 
+use super::adjoint::Adjoint;
 use super::curve::Segment;
 use super::operator::{Binary, Lanes, Unary, select};
 use super::program::{Action, Place, Program};
@@ -27,17 +28,19 @@ pub(super) struct Tape {
     segments: Vec<Segment>,
 }
 
+/// One operation of a tape.
 #[derive(Debug)]
-struct Step {
-    action: Scalar,
+pub(super) struct Step {
+    pub action: Scalar,
     /// Numbers of the arguments; of one with fewer than three, the last are repeated.
-    arguments: [usize; 3],
+    pub arguments: [usize; 3],
     /// The unknowns on which the step depends.
     depends: u64,
 }
 
+/// Action of a step.
 #[derive(Debug)]
-enum Scalar {
+pub(super) enum Scalar {
     Unary(Unary),
     Binary(Binary),
     Select,
@@ -176,6 +179,23 @@ impl Tape {
                 Scalar::Interpolate(..) => before[a].map(|t| left * t),
             };
         }
+    }
+
+    /// The backward pass to these unknowns (true for those that are wanted).
+    pub fn adjoint(&self, wanted: &[bool]) -> Adjoint {
+        let first = self.constants + self.unknowns;
+        Adjoint::new(&self.steps, (self.constants, first), &self.outputs, wanted)
+    }
+
+    /// Writes the derivatives of the outputs at the point that a backward pass gives.
+    pub fn pull(&mut self, adjoint: &mut Adjoint, out: &mut [f64]) {
+        self.differentiate();
+        adjoint.run(&self.steps, &self.partials, out);
+    }
+
+    /// Number of steps.
+    pub fn steps(&self) -> usize {
+        self.steps.len()
     }
 
     /// Number of constants: that of the first unknown.

@@ -27,6 +27,12 @@ pub trait Target: Sync {
     /// Independent draws from the prior, `count x dimension`.
     fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix;
 
+    /// A cheap density that agrees with this one at `point` in value and gradient, such as that of a model replaced by its
+    /// tangent; `None` if there is none, or if the density is zero or undefined there.
+    fn linearised(&self, _point: &[f64]) -> Option<Box<dyn Target + '_>> {
+        None
+    }
+
     /// Reason why the density can no longer be computed; from then on its values are meaningless. `None` while it
     /// works.
     fn failure(&self) -> Option<String> {

@@ -9,6 +9,9 @@ pub trait Observer: Sync {
     fn begin(&self, stage: &str, unit: &str, total: u64);
     /// `done` further units of the current stage are complete.
     fn advance(&self, done: u64);
+    /// The units of work of the current stage, as far as can be told by now: an estimate that may be revised, of a stage that
+    /// began with a total of zero.
+    fn expect(&self, _total: u64) {}
     /// The stage is complete; `note` summarises its result in a few words.
     fn end(&self, stage: &str, note: &str);
     /// A warning, which is part of the result.
@@ -52,6 +55,9 @@ impl Observer for Listener<'_> {
     }
     fn advance(&self, done: u64) {
         self.observer.advance(done);
+    }
+    fn expect(&self, total: u64) {
+        self.observer.expect(total);
     }
     fn end(&self, stage: &str, note: &str) {
         self.observer.end(stage, note);
@@ -101,6 +107,12 @@ impl<'a> Progress<'a> {
     pub fn add(&self, units: u64) {
         let done = self.done.fetch_add(units, Ordering::Relaxed) + units;
         self.observer.advance(done);
+    }
+
+    /// Tells the observer that about this share of the work is done by now, for a stage whose end is not known.
+    pub fn estimate(&self, share: f64) {
+        let done = self.done.load(Ordering::Relaxed);
+        self.observer.expect((done as f64 / share).round() as u64);
     }
 
     /// Passes on a warning.

@@ -147,6 +147,10 @@ impl Likelihood for Joint {
         (by_response, by_hyper)
     }
 
+    fn is_cheap(&self) -> bool {
+        self.blocks.iter().all(|block| block.likelihood.is_cheap())
+    }
+
     fn compress(&self, linear: &dyn Linear) -> Option<Box<dyn Compressed>> {
         let parts: Option<Vec<_>> = self
             .blocks

@@ -21,6 +21,7 @@ mod conditional;
 mod given;
 mod information;
 mod joint;
+mod linearised;
 mod members;
 mod mode;
 mod of_data;
@@ -35,6 +36,7 @@ pub use mode::Mode;
 pub use of_data::OfData;
 pub use scales::CoordinateScale;
 
+use linearised::Linearised;
 use members::{Jacobian, Members};
 use pace::Pace;
 
@@ -62,6 +64,12 @@ pub trait LogLikelihood: Send + Sync {
 
     /// Log-likelihood at one point and its derivatives, by the parameters and then by the hyperparameters.
     fn value_and_gradient(&self, theta: &[f64], hyper: &[f64]) -> (f64, Vec<f64>);
+
+    /// A cheap log-likelihood that agrees with this one in value and gradient at these parameters, whatever the
+    /// hyperparameters; `None` if there is none.
+    fn linearised(&self, _theta: &[f64]) -> Option<Box<dyn LogLikelihood + '_>> {
+        None
+    }
 
     /// Facts for the report.
     fn facts(&self) -> Vec<Fact>;
@@ -380,5 +388,8 @@ impl Target for Posterior<'_> {
     }
     fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
         self.draws(count, stream)
+    }
+    fn linearised(&self, point: &[f64]) -> Option<Box<dyn Target + '_>> {
+        Linearised::of(self, point, true)
     }
 }

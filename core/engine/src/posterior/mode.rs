@@ -5,6 +5,7 @@ use lacuna::plugin::Target;
 use lacuna_linalg::Matrix;
 
 use super::Posterior;
+use super::linearised::Linearised;
 
 /// A posterior without the Jacobian of its logarithmic coordinates; see [`Posterior::mode`].
 pub struct Mode<'a>(pub(super) &'a Posterior<'a>);
@@ -31,5 +32,8 @@ impl Target for Mode<'_> {
     }
     fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
         self.0.draws(count, stream)
+    }
+    fn linearised(&self, point: &[f64]) -> Option<Box<dyn Target + '_>> {
+        Linearised::of(self.0, point, false)
     }
 }

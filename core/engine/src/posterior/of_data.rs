@@ -101,6 +101,25 @@ impl<'a> OfData<'a> {
         self.likelihood.log_estimate(&responses, &hyper[self.own()..])
     }
 
+    /// Log-likelihood and its derivatives, given the response of the forward map and its Jacobian (`outputs x parameters`).
+    fn value_and_gradient_of(
+        &self,
+        mean: Vec<f64>,
+        jacobian: &Matrix,
+        theta: &[f64],
+        hyper: &[f64],
+    ) -> (f64, Vec<f64>) {
+        let effects = self.effects.iter().map(|(effect, range)| (effect, &hyper[range.clone()]));
+        let (response, tangents) = with_tangents(effects, mean, jacobian, theta);
+        if response.iter().any(|y| !y.is_finite()) {
+            return (f64::NEG_INFINITY, vec![0.0; theta.len() + hyper.len()]);
+        }
+        let own = &hyper[self.own()..];
+        let value = self.likelihood.log_likelihood(&response, own);
+        let (weight, by_own) = self.likelihood.gradient(&response, own);
+        (value, [multiply_vector(&tangents, &weight), by_own].concat())
+    }
+
     fn with_effects(&self, mut response: Vec<f64>, theta: &[f64], hyper: &[f64]) -> Vec<f64> {
         for (effect, range) in &self.effects {
             response = effect.apply(&response, &hyper[range.clone()], theta);
@@ -154,15 +173,20 @@ impl<'a> LogLikelihood for OfData<'a> {
             return (value, [by_theta, by_hyper].concat());
         }
         let (mean, jacobian) = self.forward.mean_and_jacobian(theta);
-        let effects = self.effects.iter().map(|(effect, range)| (effect, &hyper[range.clone()]));
-        let (response, tangents) = with_tangents(effects, mean, &jacobian, theta);
-        if response.iter().any(|y| !y.is_finite()) {
-            return (f64::NEG_INFINITY, vec![0.0; theta.len() + hyper.len()]);
+        self.value_and_gradient_of(mean, &jacobian, theta, hyper)
+    }
+
+    /// The likelihood of the model's tangent, where its own is a cheap function of the response.
+    fn linearised(&self, theta: &[f64]) -> Option<Box<dyn LogLikelihood + '_>> {
+        if self.reduced.is_some() || self.forward.is_stochastic() || !self.likelihood.is_cheap() {
+            return None;
         }
-        let own = &hyper[self.own()..];
-        let value = self.likelihood.log_likelihood(&response, own);
-        let (weight, by_own) = self.likelihood.gradient(&response, own);
-        (value, [multiply_vector(&tangents, &weight), by_own].concat())
+        let (mean, jacobian) = self.forward.mean_and_jacobian(theta);
+        let is_finite = mean.iter().chain(jacobian.as_slice()).all(|y| y.is_finite());
+        is_finite.then(|| {
+            Box::new(Tangent { of: self, theta: theta.to_vec(), mean, jacobian })
+                as Box<dyn LogLikelihood>
+        })
     }
 
     fn facts(&self) -> Vec<Fact> {
@@ -175,5 +199,41 @@ impl<'a> LogLikelihood for OfData<'a> {
         };
         let own = self.forward.failure().or_else(|| self.likelihood.failure());
         own.or_else(|| self.effects.iter().find_map(of_effect))
+    }
+}
+
+/// A likelihood whose forward map is replaced by its tangent at a point.
+struct Tangent<'a> {
+    of: &'a OfData<'a>,
+    theta: Vec<f64>,
+    mean: Vec<f64>,
+    /// Derivatives there, `outputs x parameters`.
+    jacobian: Matrix,
+}
+
+impl Tangent<'_> {
+    fn mean(&self, theta: &[f64]) -> Vec<f64> {
+        let moved: Vec<f64> = theta.iter().zip(&self.theta).map(|(x, from)| x - from).collect();
+        let change = multiply_vector(&self.jacobian, &moved);
+        self.mean.iter().zip(change).map(|(mean, change)| mean + change).collect()
+    }
+}
+
+impl LogLikelihood for Tangent<'_> {
+    fn hyperparameters(&self) -> &[Hyperparameter] {
+        &self.of.hyper
+    }
+
+    fn values(&self, theta: &Matrix, hyper: &Matrix) -> Vec<f64> {
+        let means = theta.iter_rows().map(|theta| self.mean(theta));
+        self.of.batch(Matrix::from_rows(self.mean.len(), means), theta, hyper)
+    }
+
+    fn value_and_gradient(&self, theta: &[f64], hyper: &[f64]) -> (f64, Vec<f64>) {
+        self.of.value_and_gradient_of(self.mean(theta), &self.jacobian, theta, hyper)
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        Vec::new()
     }
 }

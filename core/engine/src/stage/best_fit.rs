@@ -168,6 +168,10 @@ impl Likelihood for LeastSquares<'_> {
         (self.outputs.iter().zip(response).map(slope).collect(), Vec::new())
     }
 
+    fn is_cheap(&self) -> bool {
+        true
+    }
+
     fn predictive(&self, _response: &[f64], _hyper: &[f64]) -> Vec<VariancePart> {
         Vec::new()
     }

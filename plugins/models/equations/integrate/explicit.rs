@@ -133,10 +133,8 @@ impl<'r, 'f> Explicit<'r, 'f> {
     fn stages(&mut self, length: f64) {
         for stage in 1..STAGES {
             let (done, rest) = self.rates.split_at_mut(stage);
-            self.trial.copy_from_slice(&self.now);
-            for (share, rates) in SHARES[stage].iter().zip(&*done) {
-                add(length * share, rates, &mut self.trial);
-            }
+            let shares = SHARES[stage].map(|share| length * share);
+            combine(&self.now, &shares, done, &mut self.trial);
             self.flow.all(self.time + PLACES[stage] * length, &self.trial, &mut rest[0]);
         }
     }
@@ -145,10 +143,8 @@ impl<'r, 'f> Explicit<'r, 'f> {
     /// states and over the sensitivities of each channel.
     fn error(&mut self, length: f64) -> f64 {
         let count = self.count();
-        self.scratch.fill(0.0);
-        for (share, rates) in ERRORS.iter().zip(&self.rates) {
-            add(length * share, rates, &mut self.scratch);
-        }
+        let shares = ERRORS.map(|share| length * share);
+        weighted::<STAGES>(None, &shares, &self.rates, &mut self.scratch);
         let mut largest = 0.0_f64;
         for first in (0..self.now.len()).step_by(count) {
             let size = if first == 0 { 1.0 } else { self.sizes[first / count - 1] };
@@ -175,9 +171,31 @@ impl<'r, 'f> Explicit<'r, 'f> {
     }
 }
 
-/// Adds `factor * numbers` to `to`, element by element.
-fn add(factor: f64, numbers: &[f64], to: &mut [f64]) {
-    to.iter_mut().zip(numbers).for_each(|(to, number)| *to += factor * number);
+/// Writes `from` plus the rates of the stages so far times their shares, element by element.
+fn combine(from: &[f64], shares: &[f64], rates: &[Vec<f64>], to: &mut [f64]) {
+    match rates.len() {
+        1 => weighted::<1>(Some(from), shares, rates, to),
+        2 => weighted::<2>(Some(from), shares, rates, to),
+        3 => weighted::<3>(Some(from), shares, rates, to),
+        4 => weighted::<4>(Some(from), shares, rates, to),
+        5 => weighted::<5>(Some(from), shares, rates, to),
+        _ => weighted::<6>(Some(from), shares, rates, to),
+    }
+}
+
+/// Writes `from`, or zero, plus the rates of the first `N` stages times their shares, element by element.
+fn weighted<const N: usize>(
+    from: Option<&[f64]>,
+    shares: &[f64],
+    rates: &[Vec<f64>],
+    to: &mut [f64],
+) {
+    let count = to.len();
+    let stages: [(f64, &[f64]); N] = std::array::from_fn(|k| (shares[k], &rates[k][..count]));
+    for (i, to) in to.iter_mut().enumerate() {
+        let first = from.map_or(0.0, |from| from[i]);
+        *to = stages.iter().fold(first, |sum, (share, rates)| sum + share * rates[i]);
+    }
 }
 
 /// Returns the ratio of the next step to the last for this error, in units of the tolerance.
@@ -262,10 +280,7 @@ impl Stepper for Explicit<'_, '_> {
         let share =
             |[a, b, c, d]: [f64; 4]| length * place * (a + place * (b + place * (c + place * d)));
         let shares = BETWEEN.map(share);
-        self.scratch.copy_from_slice(&self.before);
-        for (share, rates) in shares.iter().zip(&self.rates) {
-            add(*share, rates, &mut self.scratch);
-        }
+        weighted::<STAGES>(Some(&self.before), &shares, &self.rates, &mut self.scratch);
         values.zip(&self.scratch).for_each(|(value, found)| *value = *found);
         Ok(())
     }

@@ -147,6 +147,8 @@ fn an_evaluator_that_moves_repeats_the_program_bit_by_bit() {
     scope.define("constant", "2").unwrap();
     let program = scope.compile(&["up", "on", "constant"]).unwrap();
     let mut evaluator = Evaluator::new(&program);
+    let pattern = evaluator.prepare(&[false, true, true, true, true], 5).unwrap();
+    assert_eq!(pattern, [vec![4], vec![1, 2, 3, 4], vec![]]);
     let mut rng = Stream::root(5).generator();
     let mut point = [0.5, 1.5, 0.3, 0.0, 0.0];
     for step in 0..200 {
@@ -159,6 +161,17 @@ fn an_evaluator_that_moves_repeats_the_program_bit_by_bit() {
         evaluator.at(&point);
         let mut values = [0.0; 3];
         evaluator.values(&mut values);
+        let mut derivatives = [0.0; 5];
+        evaluator.derivatives(&mut derivatives);
+        let unit = |j: usize| std::array::from_fn::<f64, 5, _>(|i| if i == j { 1.0 } else { 0.0 });
+        let single = |i: usize, j: usize| program.push_forward(&point, &unit(j)).1[i];
+        let places =
+            pattern.iter().enumerate().flat_map(|(i, row)| row.iter().map(move |j| (i, *j)));
+        for (found, (i, j)) in derivatives.iter().zip(places) {
+            let expected = single(i, j);
+            let both = found.is_nan() && expected.is_nan() || *found == expected;
+            assert!(both || near(*found, expected, 1e-14), "{i} by {j}: {found}, {expected}");
+        }
         let lanes = std::array::from_fn(|_| 2.0 * uniform(&mut rng) - 1.0);
         let mut directions = [lanes; 5];
         directions[step % 5] = [0.0; DIRECTIONS];

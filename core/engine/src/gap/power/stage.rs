@@ -105,7 +105,7 @@ fn outcomes(
     folder: &Path,
     observer: &dyn Observer,
 ) -> Result<Vec<CaseOutcome>, Stop> {
-    let found = prepared.search()?;
+    let found = prepared.search(&|_| {})?;
     // What the data themselves hide is part of no case.
     let first = found.path.first().map_or(&found.last, |step| &step.before);
     let mut options = prepared.options;

@@ -54,6 +54,14 @@ pub(super) struct Search<'a> {
     pub(super) stream: Stream,
 }
 
+/// About the share of a search that is done after its first tests, after its first step, and before its result: between
+/// those of six records of [known effects](../../../../../examples/known_records), which differ by a factor of two.
+const FIRST_TESTS: f64 = 0.15;
+const FIRST_STEP: f64 = 0.45;
+const RESULT: f64 = 0.95;
+/// The share of the rest that a further step takes.
+const FURTHER_STEP: f64 = 0.25;
+
 /// Searches for the effects that the forward map lacks, from starts of the parameters in their units; `None` if the
 /// forward map has no response there.
 pub fn search<'a>(
@@ -62,6 +70,18 @@ pub fn search<'a>(
     starts: &[Vec<f64>],
     options: SearchOptions,
     stream: &Stream,
+) -> Option<SearchResult<'a>> {
+    search_observed(experiment, candidates, starts, options, stream, &|_| {})
+}
+
+/// Like [`search`]; `done` is told about what share of it is done, now and then.
+pub fn search_observed<'a>(
+    experiment: &'a Experiment<'a>,
+    candidates: &'a [Candidate],
+    starts: &[Vec<f64>],
+    options: SearchOptions,
+    stream: &Stream,
+    done: &dyn Fn(f64),
 ) -> Option<SearchResult<'a>> {
     let means = experiment.means().1;
     let (mut state, remainder) = base(experiment, &means, starts)?;
@@ -80,16 +100,21 @@ pub fn search<'a>(
     let mut last = loop {
         let round = path.len() as u64;
         let (diagnostics, design, projection) = search.diagnose(&state, round);
+        if round == 0 {
+            done(FIRST_TESTS);
+        }
         let first = path.first().map_or(&diagnostics, |step| &step.before).clone();
         let step = search.step(&mut state, &diagnostics, &design, &projection, round, &first);
         let Some(step) = step else {
             break diagnostics;
         };
         path.push(step);
+        done(1.0 - (1.0 - FIRST_STEP) * (1.0 - FURTHER_STEP).powi(round as i32));
     };
     if search.simplify(&mut state, &path, &search.stream.named("simpler")) {
         last = search.diagnose(&state, path.len() as u64).0;
     }
+    done(RESULT);
     let whole = search.finished(&state, path, last);
     Some(search.certain_part(whole, &state))
 }

@@ -32,7 +32,7 @@ pub use diagnostics::{Detectability, Diagnostics, SearchOptions, SearchResult, S
 pub use discriminate::{DiscriminatingData, Discrimination, FurtherData, discriminate};
 pub use evidence::{LogEvidence, log_evidence};
 pub use explained::Explained;
-pub use forward::search;
+pub use forward::{search, search_observed};
 pub use refit::{
     RefitSetting, Scored, Weighed, log_prior, most_promising, placement_prior, refit_all,
 };

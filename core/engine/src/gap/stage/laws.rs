@@ -151,7 +151,7 @@ impl ModelSearch<'_> {
         };
         let random = own.random.named("law").named("search");
         prepared(study, problem, &beginning, &random, |with| {
-            let again = with.search()?;
+            let again = with.search(&|_| {})?;
             let before = &found.first().fit.at.response;
             let mut all = with.result(&again, before, &measured.used)?;
             let added = all.worth_adding();

@@ -53,7 +53,7 @@ impl ModelSearch<'_> {
             if own.candidates.is_empty() {
                 observer.warn("no effect proposes itself for these data: only the tests are made");
             }
-            let found = own.search()?;
+            let found = own.search(&|share| self.progress.estimate(share))?;
             let mut result = own.result(&found, &found.first().fit.at.response, &measured.used)?;
             result.models = self.compared(own, &found);
             result.needless = needless(&found, &own_pieces(study), &own.random);
@@ -113,7 +113,7 @@ impl ModelSearch<'_> {
         let beginning =
             SearchModel { forward, parameters, region: None, inside: &inside, other, only: None };
         prepared(study, problem, &beginning, &random, |with| {
-            let found_with = with.search()?;
+            let found_with = with.search(&|_| {})?;
             let side = |of: &SearchResult<'_>| vec![of.last.fit.at.point.clone()];
             let sides = [
                 ModelFits { system: &found.system, starts: side(found) },

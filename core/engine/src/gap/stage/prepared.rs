@@ -22,7 +22,7 @@ use crate::gap::next::{Wish, after};
 use crate::gap::noise::{Noise, ResponseTangents};
 use crate::gap::prove::{freedoms, prove};
 use crate::gap::result::{GapResult, HeldOut};
-use crate::gap::search::{SearchOptions, SearchResult, VerdictKind, search};
+use crate::gap::search::{SearchOptions, SearchResult, VerdictKind, search_observed};
 use crate::gap::system::System;
 use crate::gap::system::emulator_error::error_covariance;
 use crate::gap::system::fit::{Fit, precision};
@@ -122,10 +122,11 @@ pub fn prepared<T>(
 }
 
 impl<'a> PreparedSearch<'a> {
-    /// Runs the search.
-    pub fn search(&'a self) -> Result<SearchResult<'a>, Stop> {
+    /// Runs the search; `done` is told about what share of it is done.
+    pub fn search(&'a self, done: &dyn Fn(f64)) -> Result<SearchResult<'a>, Stop> {
         let Self { experiment, candidates, options, .. } = *self;
-        let found = search(experiment, candidates, &self.starts, options, &self.random);
+        let found =
+            search_observed(experiment, candidates, &self.starts, options, &self.random, done);
         if let Some(failure) = self.base.beginning.forward.failure() {
             return Err(Stop::new(failure));
         }

@@ -45,6 +45,9 @@ pub(super) struct Ascent<'a, 'b> {
     pub start: Vec<f64>,
     pub best: Fit,
     damping: f64,
+    /// The log density there from a response without derivatives, once it is needed. A model that is integrated numerically
+    /// has another error with derivatives: gains of trial steps are those without.
+    plain: Option<f64>,
     /// The log density below which the fit need not be accurate.
     pub of_interest: f64,
     /// The gain in log density that the next step promises; zero at the end of the search.
@@ -83,6 +86,7 @@ impl<'a, 'b> Ascent<'a, 'b> {
             start,
             best,
             damping: 1e-3,
+            plain: None,
             of_interest: f64::NEG_INFINITY,
             promised: f64::INFINITY,
         }
@@ -103,7 +107,7 @@ impl<'a, 'b> Ascent<'a, 'b> {
             if self.promised == 0.0 {
                 break;
             }
-            let Some((point, promised)) = self.improved() else {
+            let Some((point, promised, plain)) = self.improved() else {
                 self.promised = 0.0;
                 break;
             };
@@ -111,6 +115,7 @@ impl<'a, 'b> Ascent<'a, 'b> {
             let before = self.height();
             let best = at(self.system, self.whitener, self.means, &point);
             self.best = self.window.iter().fold(best, |best, window| window.of_fit(best));
+            self.plain = Some(plain);
             let gain = self.height() - before;
             self.damp(gain / promised);
             let is_slow = gain < SLOW * (self.of_interest - self.best.log_density);
@@ -156,17 +161,21 @@ impl<'a, 'b> Ascent<'a, 'b> {
         }
     }
 
-    /// A point of larger density, with the gain that was promised. A step that does not improve is repeated with more
+    /// A point of larger density, with the gain that was promised and the density there. A step that does not improve is repeated with more
     /// damping: shorter, and closer to the gradient.
-    fn improved(&mut self) -> Option<(Vec<f64>, f64)> {
+    fn improved(&mut self) -> Option<(Vec<f64>, f64, f64)> {
+        let here = &self.best.at.point;
+        let plain = self.plain.unwrap_or_else(|| self.log_density(here));
+        self.plain = Some(plain);
+        let height = self.merit(plain, here);
         for _ in 0..TRIES {
             let (point, promised) = step(self.system, &self.best, self.damping, &self.bounds);
             if promised < PROMISED {
                 return None;
             }
             let density = self.log_density(&point);
-            if self.merit(density, &point) > self.height() {
-                return Some((point, promised));
+            if self.merit(density, &point) > height {
+                return Some((point, promised, density));
             }
             self.damping = (self.damping * 8.0).max(LEAST);
         }

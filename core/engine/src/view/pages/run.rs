@@ -77,7 +77,7 @@ fn progress(found: &Watched) -> Markup {
                 @if !p.unit.is_empty() {
                     p.note {
                         (p.unit) " " (count(p.done as usize))
-                        @if p.total > 0 { " of " (count(p.total as usize)) }
+                        @if p.total > 0 { (if p.about { " of about " } else { " of " }) (count(p.total as usize)) }
                         @if let Some(share) = row.share { " (" (percent(share)) ")" }
                         ", begun " (ago(p.begun))
                     }
