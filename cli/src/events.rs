@@ -58,11 +58,24 @@ pub struct Events {
 
 struct Current {
     stage: String,
+    done: u64,
     total: u64,
     /// True if the total is an estimate.
     about: bool,
     begun: Instant,
     spoken: Instant,
+}
+
+impl Current {
+    fn tell(&mut self) {
+        self.spoken = Instant::now();
+        let seconds = self.begun.elapsed().as_secs_f64();
+        let Self { stage, done, total, about, .. } = self;
+        write(&json!({
+            "event": "progress", "stage": stage, "done": done, "total": total, "about": about,
+            "seconds": seconds
+        }));
+    }
 }
 
 impl Events {
@@ -75,32 +88,32 @@ impl Observer for Events {
     fn begin(&self, stage: &str, unit: &str, total: u64) {
         write(&json!({ "event": "begin", "stage": stage, "unit": unit, "total": total }));
         let now = Instant::now();
-        let current =
-            Current { stage: stage.to_owned(), total, about: false, begun: now, spoken: now };
+        let current = Current {
+            stage: stage.to_owned(),
+            done: 0,
+            total,
+            about: false,
+            begun: now,
+            spoken: now,
+        };
         self.with(|slot| *slot = Some(current));
     }
 
     fn advance(&self, done: u64) {
         self.with(|slot| {
             let Some(current) = slot else { return };
-            if current.spoken.elapsed() < INTERVAL {
-                return;
+            current.done = current.done.max(done);
+            if current.spoken.elapsed() >= INTERVAL {
+                current.tell();
             }
-            current.spoken = Instant::now();
-            let seconds = current.begun.elapsed().as_secs_f64();
-            let Current { stage, total, about, .. } = current;
-            write(&json!({
-                "event": "progress", "stage": stage, "done": done, "total": total, "about": about,
-                "seconds": seconds
-            }));
         });
     }
 
     fn expect(&self, total: u64) {
         self.with(|slot| {
-            if let Some(current) = slot {
-                (current.total, current.about) = (total, true);
-            }
+            let Some(current) = slot else { return };
+            (current.total, current.about) = (total, true);
+            current.tell();
         });
     }
 

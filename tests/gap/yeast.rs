@@ -20,7 +20,7 @@ fn yeast_lacks_the_logistic_law_and_the_search_tells_how_far_it_is() {
         (&gap["verdict"], &gap["class"][0]),
         (&"class".into(), &"quadratic_friction".into())
     );
-    assert!(gap["held_out"][0]["shrank"].as_bool() == Some(true), "{}", gap["held_out"]);
+    assert!(gap["held_out"]["shrank"].as_bool() == Some(true), "{}", gap["held_out"]);
     // R. Pearl, Quarterly Review of Biology 2 (1927) 532, by a fit of other weights: 665 / (1 + exp(4.1896 - 0.5355 t)).
     let published = 0.5355 / 665.0;
     let crowding = &gap["effects"][0]["parameters"]["quadratic_friction"]["mean"];
