@@ -347,9 +347,18 @@ static int32_t simulate(void *object, LacunaNumbers response, LacunaNumbers hype
     return LACUNA_OK;
 }
 
+/* A few operations for each output and direction: the program may ask often. */
+static int32_t is_cheap(void *object, uint8_t *cheap, const LacunaAnswer *answer)
+{
+    (void)object;
+    (void)answer;
+    *cheap = 1;
+    return LACUNA_OK;
+}
+
 static const LacunaLikelihoodFunctions likelihood_functions = {
     sizeof(LacunaLikelihoodFunctions), end_likelihood, hyperparameters, log_likelihood, gradient, predictive, simulate,
-    NULL, NULL, NULL, NULL
+    NULL, NULL, NULL, NULL, is_cheap
 };
 
 /* Counts, means and scatter of the measured values; returns 0 if one is not a number. */

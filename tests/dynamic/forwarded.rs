@@ -116,7 +116,8 @@ fn told(likelihood: &dyn Likelihood) -> (Vec<u64>, Vec<Measurements>, String) {
     let response: Vec<f64> = (0..OUTPUTS).map(|i| (1.1 * i as f64).sin()).collect();
     let hyper: Vec<f64> = likelihood.hyperparameters().iter().map(|h| h.start).collect();
     let (by_response, by_hyper) = likelihood.gradient(&response, &hyper);
-    let mut numbers = vec![likelihood.log_likelihood(&response, &hyper)];
+    let cheap = f64::from(u8::from(likelihood.is_cheap()));
+    let mut numbers = vec![likelihood.log_likelihood(&response, &hyper), cheap];
     numbers.extend(by_response.into_iter().chain(by_hyper));
     numbers.extend(likelihood.left_out(&response, &hyper).unwrap_or_default());
     if let Some(errors) = likelihood.sampled_errors(&hyper) {

@@ -232,7 +232,7 @@ static const struct {
 #else
     gradient,
 #endif
-    predictive, simulate, left_out, NULL, NULL, sampled_errors
+    predictive, simulate, left_out, NULL, NULL, sampled_errors, NULL
 }, (size_t)-1};
 
 static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikelihood *out, const LacunaAnswer *answer)

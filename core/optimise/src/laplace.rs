@@ -33,10 +33,7 @@ pub fn laplace(target: &dyn Target, maximum: &[f64]) -> Result<Laplace, Stop> {
     let start = Matrix::from_rows(maximum.len(), [maximum]);
     let regions = super::regions(target, &start);
     let pressure = pressure(target, maximum);
-    let curved = match target.linearised(maximum) {
-        Some(near) => scales_near(target, maximum, &regions, &scales(&*near, maximum, &regions)),
-        None => scales(target, maximum, &regions),
-    };
+    let curved = scales(target, maximum, &regions);
     // Precisions add: that of the curvature, and that of the exponential fall from a bound.
     let scales: Vec<f64> =
         curved.iter().zip(&pressure).map(|(s, p)| 1.0 / (1.0 / (s * s) + p).sqrt()).collect();
@@ -84,18 +81,12 @@ fn pressure(target: &dyn Target, maximum: &[f64]) -> Vec<f64> {
 /// Standard deviation of each coordinate given the others, from the curvature; the size of its region if the density
 /// does not curve downwards.
 pub(super) fn scales(target: &dyn Target, x: &[f64], regions: &[Region]) -> Vec<f64> {
-    let sizes: Vec<f64> = regions.iter().map(|region| region.size).collect();
-    scales_near(target, x, regions, &sizes)
+    (0..x.len()).map(|j| scale(target, x, j, regions[j])).collect()
 }
 
-/// Like [`scales`], given values that may be near them.
-fn scales_near(target: &dyn Target, x: &[f64], regions: &[Region], guesses: &[f64]) -> Vec<f64> {
-    (0..x.len()).map(|j| scale(target, x, j, regions[j], guesses[j])).collect()
-}
-
-fn scale(target: &dyn Target, x: &[f64], j: usize, region: Region, guess: f64) -> f64 {
-    // The step must match the scale that it measures: start from a guess and iterate.
-    let mut step = STEP * guess;
+fn scale(target: &dyn Target, x: &[f64], j: usize, region: Region) -> f64 {
+    // The step must match the scale that it measures: start from the size of the region and iterate.
+    let mut step = STEP * region.size;
     let mut found = region.size;
     for _ in 0..30 {
         let curvature = slope_of_gradient(target, x, j, step).map(|slopes| -slopes[j]);

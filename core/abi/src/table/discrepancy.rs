@@ -113,6 +113,9 @@ functions! {
         /// `outputs x directions`; and of those that are left out, `outputs x any number`. `ABSENT` where it has
         /// their whole covariance. Since version 1.1.
         may sampled_errors(hyper: Numbers);
+        /// Writes 1 where value and gradient take a number of operations proportional to the number of data, so that they can
+        /// be computed many times for each response of the model; 0, or null, where not. Since version 1.2.
+        may is_cheap(cheap: *mut u8);
     }
 }
 

@@ -9,20 +9,13 @@ use lacuna_linalg::Matrix;
 use super::pace::Pace;
 use super::{LogLikelihood, Posterior};
 
-/// A density that agrees with that of a posterior, or with its [mode](Posterior::mode)'s, in value and gradient at a point.
-pub(super) struct Linearised<'a> {
-    posterior: Posterior<'a>,
-    /// True if the density has the Jacobian of logarithmic coordinates.
-    jacobian: bool,
-}
+/// A density that agrees with that of a posterior's [mode](Posterior::mode) in value and gradient at a point. The posterior
+/// itself has none: samplers in libraries, which see its values and gradients only, have to give the same bits.
+pub(super) struct Linearised<'a>(Posterior<'a>);
 
 impl<'a> Linearised<'a> {
     /// The density about a point; `None` if the likelihood has no cheap tangent there.
-    pub fn of(
-        posterior: &'a Posterior<'_>,
-        point: &[f64],
-        jacobian: bool,
-    ) -> Option<Box<dyn Target + 'a>> {
+    pub fn of(posterior: &'a Posterior<'_>, point: &[f64]) -> Option<Box<dyn Target + 'a>> {
         let natural = posterior.natural(point);
         if !posterior.log_prior(&natural).is_finite() {
             return None;
@@ -38,32 +31,28 @@ impl<'a> Linearised<'a> {
             numbers: posterior.numbers,
             pace: Pace::default(),
         };
-        Some(Box::new(Self { posterior, jacobian }))
+        Some(Box::new(Self(posterior)))
     }
 }
 
 impl Target for Linearised<'_> {
     fn dimension(&self) -> usize {
-        self.posterior.dimension()
+        self.0.dimension()
     }
     fn log_density(&self, points: &Matrix) -> Vec<f64> {
-        self.posterior.batch(points, self.jacobian)
+        self.0.batch(points, false)
     }
     fn log_prior(&self, points: &Matrix) -> Vec<f64> {
-        if self.jacobian {
-            Target::log_prior(&self.posterior, points)
-        } else {
-            self.posterior.mode().log_prior(points)
-        }
+        self.0.mode().log_prior(points)
     }
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
-        self.posterior.value_and_gradient(point, self.jacobian)
+        self.0.value_and_gradient(point, false)
     }
     fn bounds(&self) -> Vec<(f64, f64)> {
-        self.posterior.coordinate_bounds()
+        self.0.coordinate_bounds()
     }
     fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
-        self.posterior.draws(count, stream)
+        self.0.draws(count, stream)
     }
 }
 
@@ -150,30 +139,29 @@ mod tests {
         let likelihood = OfData::new(&Decay, Vec::new(), &ones);
         let posterior = Posterior::new(&parameters[..], likelihood);
         let point = [1.3, 0.2, -0.7];
-        for target in [&posterior as &dyn Target, &posterior.mode()] {
-            let tangent = target.linearised(&point).unwrap();
-            let (value, gradient) = target.gradient(&point);
-            let (own, slopes) = tangent.gradient(&point);
-            assert!((value - own).abs() < 1e-12);
-            for (g, s) in gradient.iter().zip(&slopes) {
-                assert!((g - s).abs() < 1e-12, "{gradient:?} {slopes:?}");
-            }
-            let row = |x: &[f64]| Matrix::from_rows(3, [x]);
-            // The response is linear in the amplitude: along it and the variance the tangent is exact.
-            let moved = [2.1, 0.2, 0.4];
-            let [exact, found] = [target, &*tangent]
-                .map(|t| (t.log_density(&row(&moved))[0], t.log_prior(&row(&moved))[0]));
-            assert!((exact.0 - found.0).abs() < 1e-12 && (exact.1 - found.1).abs() < 1e-12);
-            let bent = [1.3, 0.5, -0.7];
-            assert!(
-                (target.log_density(&row(&bent))[0] - tangent.log_density(&row(&bent))[0]).abs()
-                    > 0.1
-            );
-            assert_eq!(target.bounds(), tangent.bounds());
-            assert!(target.linearised(&[1.3, 3.0, -0.7]).is_none(), "outside of the prior");
+        let target = posterior.mode();
+        let tangent = target.linearised(&point).unwrap();
+        let (value, gradient) = target.gradient(&point);
+        let (own, slopes) = tangent.gradient(&point);
+        assert!((value - own).abs() < 1e-12);
+        for (g, s) in gradient.iter().zip(&slopes) {
+            assert!((g - s).abs() < 1e-12, "{gradient:?} {slopes:?}");
         }
+        let row = |x: &[f64]| Matrix::from_rows(3, [x]);
+        // The response is linear in the amplitude: along it and the variance the tangent is exact.
+        let moved = [2.1, 0.2, 0.4];
+        let [exact, found] = [&target as &dyn Target, &*tangent]
+            .map(|t| (t.log_density(&row(&moved))[0], t.log_prior(&row(&moved))[0]));
+        assert!((exact.0 - found.0).abs() < 1e-12 && (exact.1 - found.1).abs() < 1e-12);
+        let bent = [1.3, 0.5, -0.7];
+        assert!(
+            (target.log_density(&row(&bent))[0] - tangent.log_density(&row(&bent))[0]).abs() > 0.1
+        );
+        assert_eq!(target.bounds(), tangent.bounds());
+        assert!(target.linearised(&[1.3, 3.0, -0.7]).is_none(), "outside of the prior");
         let slow = Ones { cheap: false, hyper: ones.hyper.clone() };
         let likelihood = OfData::new(&Decay, Vec::new(), &slow);
-        assert!(Posterior::new(&parameters[..], likelihood).linearised(&point).is_none());
+        let posterior = Posterior::new(&parameters[..], likelihood);
+        assert!(posterior.mode().linearised(&point).is_none());
     }
 }

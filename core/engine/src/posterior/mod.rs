@@ -36,7 +36,6 @@ pub use mode::Mode;
 pub use of_data::OfData;
 pub use scales::CoordinateScale;
 
-use linearised::Linearised;
 use members::{Jacobian, Members};
 use pace::Pace;
 
@@ -388,8 +387,5 @@ impl Target for Posterior<'_> {
     }
     fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
         self.draws(count, stream)
-    }
-    fn linearised(&self, point: &[f64]) -> Option<Box<dyn Target + '_>> {
-        Linearised::of(self, point, true)
     }
 }

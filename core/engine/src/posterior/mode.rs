@@ -34,6 +34,6 @@ impl Target for Mode<'_> {
         self.0.draws(count, stream)
     }
     fn linearised(&self, point: &[f64]) -> Option<Box<dyn Target + '_>> {
-        Linearised::of(self.0, point, false)
+        Linearised::of(self.0, point)
     }
 }

@@ -103,6 +103,12 @@ impl ServeLikelihood for Own {
         out.json(&self.own.facts())
     }
 
+    fn is_cheap(&self, cheap: Space<'_, u8>, _: &Out) -> Done {
+        // SAFETY: the caller gives a place for one mark.
+        unsafe { cheap.put(u8::from(self.own.is_cheap())) };
+        Ok(())
+    }
+
     fn sampled_errors(&self, hyper: Rows<'_>, out: &Out) -> Done {
         let errors = self.own.sampled_errors(&hyper).ok_or_else(Refusal::absent)?;
         out.row(&errors.noise);

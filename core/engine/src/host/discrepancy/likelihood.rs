@@ -9,7 +9,7 @@ use lacuna::plugin::forward::Linear;
 use lacuna::plugin::{Fact, Hyperparameter};
 use lacuna_abi::check::{numbers_only, shaped};
 use lacuna_abi::linear::ServedLinear;
-use lacuna_abi::object::densities;
+use lacuna_abi::object::{densities, mark};
 use lacuna_abi::table::{self, LikelihoodFunctions, Numbers};
 use lacuna_abi::{Object, Refusal};
 use lacuna_linalg::Matrix;
@@ -152,6 +152,12 @@ impl Likelihood for LoadedLikelihood {
         let call = |to, beside| unsafe { self.object.gradient(response, hyper, to, beside) };
         let density = || self.log_likelihood(response, hyper);
         slopes(&self.object, (response.len(), hyper.len()), call, density)
+    }
+
+    fn is_cheap(&self) -> bool {
+        // SAFETY: there is a place for one mark.
+        let cheap = mark(false, |to| unsafe { self.object.is_cheap(to) });
+        self.object.or_fault(cheap, || false)
     }
 
     fn compress(&self, linear: &dyn Linear) -> Option<Box<dyn Compressed>> {
