@@ -268,8 +268,8 @@ typedef struct LacunaLikelihoodFunctions {
      * `ABSENT` where it has their whole covariance. Since version 1.1. */
     /* May be null. */
     int32_t (*sampled_errors)(void *likelihood, LacunaNumbers hyper, const LacunaAnswer *answer);
-    /* Writes 1 where value and gradient take a number of operations proportional to the number of data, so that they
-     * can be computed many times for each response of the model; 0, or null, where not. Since version 1.2. */
+    /* Writes 1 where value and gradient take a number of operations proportional to the number of data, so that
+     * they can be computed many times for each response of the model; 0, or null, where not. Since version 1.2. */
     /* May be null. */
     int32_t (*is_cheap)(void *likelihood, uint8_t *cheap, const LacunaAnswer *answer);
 } LacunaLikelihoodFunctions;
