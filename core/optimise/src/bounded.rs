@@ -33,7 +33,16 @@ pub(super) struct Reached {
 impl<'a> Scaled<'a> {
     /// Coordinates centred at `origin`.
     pub fn new(target: &'a dyn Target, origin: &[f64], scales: &[f64]) -> Self {
-        let bounds = target.bounds();
+        Self::inside(target, target.bounds(), origin, scales)
+    }
+
+    /// Coordinates centred at `origin`, within these bounds, which lie inside those of the target.
+    pub fn inside(
+        target: &'a dyn Target,
+        bounds: Vec<(f64, f64)>,
+        origin: &[f64],
+        scales: &[f64],
+    ) -> Self {
         let scaled = |bound: fn(&(f64, f64)) -> f64| {
             bounds.iter().zip(origin).zip(scales).map(|((b, x), s)| (bound(b) - x) / s).collect()
         };

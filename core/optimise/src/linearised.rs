@@ -5,7 +5,6 @@
 //! and Wright, Numerical Optimization, 2nd edition (2006), algorithm 4.1 and section 10.3).
 
 use lacuna_base::math::Target;
-use lacuna_base::math::random::Stream;
 use lacuna_linalg::Matrix;
 
 use crate::bounded::Scaled;
@@ -67,9 +66,11 @@ fn step(
 ) -> Option<Step> {
     let (present, slopes) = near.gradient(point);
     let scales = laplace::scales(near, point, regions);
+    let bounds = near.bounds();
     for tried in 1..=TRIES {
-        let inside = Boxed::about(near, point, regions, *radius);
-        let top = Scaled::new(&inside, point, &scales).maximise(present, &slopes, FINEST);
+        let inside = around(&bounds, point, regions, *radius);
+        let search = Scaled::inside(near, inside, point, &scales);
+        let top = search.maximise(present, &slopes, FINEST);
         let (next, top) = (top.point, top.value);
         let predicted = top - present;
         // Also false for a NaN.
@@ -103,42 +104,18 @@ fn value_at(target: &dyn Target, point: &[f64]) -> f64 {
     target.log_density(&Matrix::from_rows(point.len(), [point]))[0]
 }
 
-/// A density within a box about a point.
-struct Boxed<'a> {
-    near: &'a dyn Target,
-    bounds: Vec<(f64, f64)>,
-}
-
-impl<'a> Boxed<'a> {
-    fn about(near: &'a dyn Target, centre: &[f64], regions: &[Region], radius: f64) -> Self {
-        let side = |(((low, high), x), region): (((f64, f64), &f64), &Region)| {
-            let reach = radius * region.size;
-            ((x - reach).max(low), (x + reach).min(high))
-        };
-        let bounds = near.bounds().into_iter().zip(centre).zip(regions).map(side).collect();
-        Self { near, bounds }
-    }
-}
-
-impl Target for Boxed<'_> {
-    fn dimension(&self) -> usize {
-        self.near.dimension()
-    }
-    fn log_density(&self, points: &Matrix) -> Vec<f64> {
-        self.near.log_density(points)
-    }
-    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
-        self.near.log_prior(points)
-    }
-    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
-        self.near.gradient(point)
-    }
-    fn bounds(&self) -> Vec<(f64, f64)> {
-        self.bounds.clone()
-    }
-    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
-        self.near.prior_draws(count, stream)
-    }
+/// The part of the bounds within a box about a point.
+fn around(
+    bounds: &[(f64, f64)],
+    centre: &[f64],
+    regions: &[Region],
+    radius: f64,
+) -> Vec<(f64, f64)> {
+    let side = |((&(low, high), x), region): ((&(f64, f64), &f64), &Region)| {
+        let reach = radius * region.size;
+        ((x - reach).max(low), (x + reach).min(high))
+    };
+    bounds.iter().zip(centre).zip(regions).map(side).collect()
 }
 
 #[cfg(test)]
@@ -146,7 +123,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    use lacuna_base::math::random::normal;
+    use lacuna_base::math::random::{Stream, normal};
 
     use crate::*;
 

@@ -21,7 +21,6 @@ mod conditional;
 mod given;
 mod information;
 mod joint;
-mod linearised;
 mod members;
 mod mode;
 mod of_data;
@@ -112,9 +111,7 @@ impl<'a> Posterior<'a> {
     }
 
     fn with_members(&self, members: Members<'a>) -> Self {
-        let (prior, likelihood) = (self.prior, self.likelihood.clone());
-        let (region, numbers, pace) = (self.region.clone(), self.numbers, Pace::default());
-        Self { prior, likelihood, region, members, numbers, pace }
+        Self { members, ..self.with_likelihood(self.likelihood.clone()) }
     }
 
     /// The same density in coordinates whose members are centred to these degrees, from 0 to 1 and in the order of
@@ -188,13 +185,6 @@ impl<'a> Posterior<'a> {
         let d = self.parameters().len();
         let is_log = |i: usize| i >= d && self.hyperparameters()[i - d].log;
         point.iter().enumerate().map(|(i, &x)| if is_log(i) { map(x) } else { x }).collect()
-    }
-
-    /// This density over the same coordinates without the Jacobian of the logarithms: its maximum is the mode of the
-    /// density in natural units. With populations the maximum is that of locations and logarithms of scales with the members
-    /// integrated out, and of the members given these: the density of the members themselves is infinite where a scale is zero.
-    pub fn mode(&'a self) -> Mode<'a> {
-        Mode(self)
     }
 
     /// Prior of each coordinate's natural value alone.

@@ -208,3 +208,64 @@ fn step(system: &System<'_>, here: &Fit, damping: f64, bounds: &[(f64, f64)]) ->
     let next = |j: usize| moved(&priors[j], point[j], shift[j]).clamp(bounds[j].0, bounds[j].1);
     ((0..point.len()).map(next).collect(), promised)
 }
+
+#[cfg(test)]
+mod tests {
+    use lacuna::data::{Measurements, Replicate};
+    use lacuna::math::distribution::Distribution;
+    use lacuna::math::random::{Stream, normal};
+    use lacuna::plugin::Forward;
+    use lacuna_linalg::Matrix;
+
+    use crate::gap::experiment::Experiment;
+    use crate::gap::system::System;
+    use crate::gap::system::fit::fit;
+    use crate::gap::system::whitener::Whitener;
+    use crate::gap::testing::SyntheticExperiment;
+
+    const POINTS: usize = 60;
+
+    /// A level, whose response without derivatives has a numerical error of a third of the noise.
+    struct Level;
+
+    impl Forward for Level {
+        fn dimension(&self) -> usize {
+            1
+        }
+        fn outputs(&self) -> usize {
+            POINTS
+        }
+        fn mean(&self, points: &Matrix) -> Matrix {
+            let error = |t: usize| if t.is_multiple_of(2) { 0.3 } else { -0.3 };
+            Matrix::from_fn(points.rows(), POINTS, |i, t| points[(i, 0)] + error(t))
+        }
+        fn jacobian(&self, _: &[f64]) -> Matrix {
+            Matrix::from_fn(POINTS, 1, |_, _| 1.0)
+        }
+        fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+            (vec![point[0]; POINTS], self.jacobian(point))
+        }
+    }
+
+    /// Closed form: the mean of the data, whose standard deviation is that of the noise by the root of their number.
+    #[test]
+    fn an_error_of_values_without_derivatives_does_not_hold_a_fit_up() {
+        let mut world =
+            SyntheticExperiment::new(&["c"], &["s"], POINTS, 0.0, &["level"], |_, _, _, _| 0.0);
+        world.parameters[0].prior = Distribution::Normal([0.0, 100.0]);
+        let mut rng = Stream::root(6).generator();
+        let values: Vec<f64> = (0..POINTS).map(|_| 5.0 + normal(&mut rng)).collect();
+        let mean = values.iter().sum::<f64>() / POINTS as f64;
+        let replicate = Replicate::new("1", values.into_iter().map(Some).collect());
+        let measured = Measurements::new(world.layouts.blocks[0].clone(), vec![replicate]).into();
+        let experiment = Experiment::new(&world.layouts, &world.parameters, &Level, &measured);
+        let (_, means) = experiment.means();
+        let whitener = Whitener::new(&experiment, &world.noise, &means);
+        let system = System::new(&experiment, Vec::new());
+        let sd = (POINTS as f64).sqrt().recip();
+        for off in [-1.5, 1.5] {
+            let found = fit(&system, &whitener, &means, &[mean + off * sd]).at.point[0];
+            assert!((found - mean).abs() < 0.05 * sd, "{off}: {found} {mean} ± {sd}");
+        }
+    }
+}
