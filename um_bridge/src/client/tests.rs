@@ -40,7 +40,7 @@ fn script(answers: Vec<String>) -> Script {
             noted.lock().unwrap().extend(question);
             let answer = &answers[i.min(answers.len() - 1)];
             if answer == "silence" {
-                std::thread::sleep(Duration::from_secs(3));
+                std::thread::sleep(Duration::from_secs(60));
             }
             let _ = stream.write_all(answer.as_bytes());
         }
@@ -53,7 +53,7 @@ fn about() -> About {
 }
 
 fn evaluate(script: &Script, retries: u32) -> Result<Vec<Vec<f64>>, Error> {
-    let client = Client::new(&script.url, Duration::from_millis(700), retries);
+    let client = Client::new(&script.url, Duration::from_secs(2), retries);
     client.evaluate(&about(), &[vec![1.0]])
 }
 
@@ -140,10 +140,10 @@ fn a_slow_server_is_not_waited_for_and_not_asked_again() {
     let script = script(vec!["silence".to_owned()]);
     let begun = Instant::now();
     let error = evaluate(&script, 3).unwrap_err();
-    assert!(begun.elapsed() < Duration::from_secs(2));
+    assert!(begun.elapsed() < Duration::from_secs(30), "the server is silent for 60 s");
     assert_eq!(
         error.to_string(),
-        format!("the server at {} has not answered within 0.7 s", script.url)
+        format!("the server at {} has not answered within 2 s", script.url)
     );
     assert!(!error.is_final());
     assert_eq!(script.asked.load(Ordering::SeqCst), 1);

@@ -13,10 +13,18 @@ fn shell(script: &str, folder: &Path) -> Command {
     command
 }
 
-/// Returns `true` if the process whose id is in a file ends within two seconds.
+/// A shell that starts a child, writes the child's id to the file `child`, and goes on.
+const PARENT: &str = "sleep 100 & echo $! > child; sleep 100";
+
+/// Returns `true` once the id of the child is written: the shell creates the file before it writes to it.
+fn started(file: &Path) -> bool {
+    fs::read_to_string(file).is_ok_and(|pid| pid.ends_with('\n'))
+}
+
+/// Returns `true` if the process whose id is in a file ends within twenty seconds.
 fn ends(file: &Path) -> bool {
     let begun = Instant::now();
-    while begun.elapsed() < Duration::from_secs(2) {
+    while begun.elapsed() < Duration::from_secs(20) {
         let pid = fs::read_to_string(file).unwrap_or_default();
         let state = fs::read_to_string(format!("/proc/{}/stat", pid.trim())).unwrap_or_default();
         // A zombie process has ended; its parent, which must wait for it, is not under the test's control.
@@ -31,22 +39,24 @@ fn ends(file: &Path) -> bool {
 #[test]
 fn what_takes_too_long_is_ended_with_its_children() {
     let folder = tempfile::tempdir().unwrap();
-    let script = "sleep 100 & echo $! > child; sleep 100";
-    let mut process = Process::start(&mut shell(script, folder.path())).unwrap();
+    let child = folder.path().join("child");
+    let mut process = Process::start(&mut shell(PARENT, folder.path())).unwrap();
+    while !started(&child) {
+        thread::sleep(Duration::from_millis(10));
+    }
     let begun = Instant::now();
     assert_eq!(process.wait(Some(Duration::from_millis(300))).unwrap(), None);
-    assert!(begun.elapsed() < Duration::from_secs(5));
-    assert!(ends(&folder.path().join("child")));
+    assert!(begun.elapsed() < Duration::from_secs(50), "the shell would sleep for 100 s");
+    assert!(ends(&child));
 }
 
 #[test]
 fn what_must_not_go_on_is_ended_with_its_children() {
     let folder = tempfile::tempdir().unwrap();
-    let script = "sleep 100 & echo $! > child; sleep 100";
-    let mut process = Process::start(&mut shell(script, folder.path())).unwrap();
-    let begun = || !folder.path().join("child").exists();
-    assert_eq!(process.wait_while(None, begun).unwrap(), End::Stopped);
-    assert!(ends(&folder.path().join("child")));
+    let child = folder.path().join("child");
+    let mut process = Process::start(&mut shell(PARENT, folder.path())).unwrap();
+    assert_eq!(process.wait_while(None, || !started(&child)).unwrap(), End::Stopped);
+    assert!(ends(&child));
 }
 
 #[test]
