@@ -168,6 +168,8 @@ struct Ascended {
     evaluations: usize,
     /// False if the ascent has yet to begin.
     is_top: bool,
+    /// Gain in log density that the numerical error of the density hides; zero if it hides none.
+    hidden: f64,
 }
 
 impl Ascended {
@@ -196,7 +198,7 @@ fn rise(target: &dyn Target, start: &[f64], regions: &[Region]) -> Option<Ascend
         return None;
     }
     let scales = laplace::scales(target, &point, regions);
-    Some(Ascended { point, value, gradient, scales, evaluations: 1, is_top: false })
+    Some(Ascended { point, value, gradient, scales, evaluations: 1, is_top: false, hidden: 0.0 })
 }
 
 /// Follows L-BFGS-B until the gradient is negligible, unless an ascent has made it small already.
@@ -205,9 +207,12 @@ fn polish(target: &dyn Target, mut at: Ascended, regions: &[Region]) -> Ascended
     if at.is_top && at.gradient_norm(&bounds) <= CONVERGED {
         return at;
     }
+    // Smaller gains are those of a random walk in the numerical error.
+    let least = at.hidden / at.value.abs().max(1.0);
+    let precision = Precision { gain: Some(least.max(f64::EPSILON)), ..FINEST };
     for _ in 0..PASSES {
         let reached =
-            Scaled::new(target, &at.point, &at.scales).maximise(at.value, &at.gradient, FINEST);
+            Scaled::new(target, &at.point, &at.scales).maximise(at.value, &at.gradient, precision);
         at.evaluations += reached.evaluations;
         let gain = reached.value - at.value;
         if gain >= 0.0 {
@@ -216,7 +221,7 @@ fn polish(target: &dyn Target, mut at: Ascended, regions: &[Region]) -> Ascended
         at.scales = laplace::scales(target, &at.point, regions);
         let small = at.gradient_norm(&bounds) < 1e-3 * CONVERGED;
         // Below this gain the rounding of the density hides any further improvement.
-        if small || gain <= 1e-13 * at.value.abs() {
+        if small || gain <= at.hidden.max(1e-13 * at.value.abs()) {
             break;
         }
     }
