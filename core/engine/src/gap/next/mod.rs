@@ -1,8 +1,9 @@
 //! The next data: how many bits further measurements, or runs of the simulator, are expected to give on the name of what is
 //! missing, on the parameters, and on a quantity of the response.
 //!
-//! Each hypothesis is a type of effect at its best fit, with a normal posterior of its unknowns, of the errors of
-//! emulator and numerics, and of its remainder; these are the same in old data and new. Under it the new data are normal.
+//! Each hypothesis is a type of effect at its best fit, or a free form in its place, with a normal posterior of its
+//! unknowns, of the errors of emulator and numerics, and of its remainder; these are the same in old data and new. Under it
+//! the new data are normal.
 //! The bits on the name are the mutual information of hypothesis and new data; those on the parameters are the expected
 //! decrease of their entropy, averaged over the hypotheses; those on a quantity are its mutual information with the data
 //! (Lindley, Annals of Mathematical Statistics 27 (1956) 986; Chaloner and Verdinelli, Statistical Science 10 (1995) 273).
@@ -49,7 +50,8 @@ pub struct Wish<'a> {
 /// Information that further data are expected to give.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NextData {
-    /// Types that the name may be, with their posterior probabilities among these; empty if there is no choice.
+    /// Types that the name may be, and that none of them is right, with their posterior probabilities; empty if there is no
+    /// choice.
     pub hypotheses: Vec<WeightedName>,
     /// The purpose by which the options are ranked, per cost: the name if there is a choice, or else the quantity if the study states one,
     /// or else the parameters.
@@ -65,7 +67,7 @@ pub struct NextData {
 pub struct WeightedName {
     /// Type.
     pub kind: String,
-    /// Posterior probability among the types listed, as the search computed it.
+    /// Posterior probability: that of the types is shared as the search computed it.
     pub weight: f64,
 }
 
@@ -91,14 +93,15 @@ pub struct NextOption {
 }
 
 /// The information expected from the options of a study after a search; `None` if a response is not finite or a posterior
-/// has no density.
+/// has no density. `none` is the probability that none of the types is right.
 pub fn after<'a>(
     found: &SearchResult<'a>,
     candidates: &'a [Candidate],
+    none: Option<f64>,
     wish: Wish<'_>,
     stream: &Stream,
 ) -> Option<NextData> {
-    let all = possible(found, candidates);
+    let all = possible(found, candidates, none);
     let weighted: Vec<(String, f64, Explanation<'_, '_>)> =
         all.iter().map(|own| (own.kind.clone(), own.weight, own.explanation())).collect();
     next(&weighted, &found.noise, wish, stream)

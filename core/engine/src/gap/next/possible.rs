@@ -1,17 +1,27 @@
-//! The hypotheses of what is missing: the types that a search weighed in the place of its least certain effect.
+//! The hypotheses of what is missing: the types that a search weighed in the place of its least certain effect, and a free
+//! form in its place.
 
 use lacuna::plugin::discrepancy::CommonError;
 
+use super::planned::planned;
 use crate::gap::candidates::{Candidate, Placement};
+use crate::gap::experiment::Experiment;
 use crate::gap::search::{Explanation, SearchResult, Weighed};
 use crate::gap::system::System;
-use crate::gap::system::fit::Fit;
+use crate::gap::system::fit::{Fit, fit};
+use crate::gap::system::remainder::{Remainder, noise_of_mean};
 
 /// The smallest share of the posterior probability with which a type is a hypothesis of what is missing.
 const POSSIBLE: f64 = 1e-3;
 
+/// The smallest probability that no type is right with which that is a hypothesis.
+const DOUBT: f64 = 0.05;
+
 /// The name of the model without effects.
 const NOTHING: &str = "nothing";
+
+/// The name of the hypothesis that no type is right.
+const NONE: &str = "none of these";
 
 /// A hypothesis with its fit to the data.
 pub(super) struct Possible<'a> {
@@ -26,10 +36,21 @@ pub(super) struct Possible<'a> {
 
 impl<'a> Possible<'a> {
     fn of(found: &SearchResult<'a>, kind: &str, weight: f64, system: System<'a>, fit: Fit) -> Self {
+        Self::leaving(found, &found.remainder, kind, weight, system, fit)
+    }
+
+    fn leaving(
+        found: &SearchResult<'a>,
+        remainder: &Remainder,
+        kind: &str,
+        weight: f64,
+        system: System<'a>,
+        fit: Fit,
+    ) -> Self {
         let outputs = system.experiment.outputs() as f64;
-        let white = found.remainder.white(&found.whitener);
+        let white = remainder.white(&found.whitener);
         let setting = white.evidences(&fit).and_then(|all| all.best());
-        let remainder = setting.map(|setting| found.remainder.common(setting, outputs));
+        let remainder = setting.map(|setting| remainder.common(setting, outputs));
         Self { kind: kind.to_owned(), weight, system, fit, remainder }
     }
 
@@ -40,15 +61,17 @@ impl<'a> Possible<'a> {
 }
 
 /// The hypotheses after a search. The type of one effect is in question, the least certain one; the others are there in
-/// every hypothesis. What the search found is the only hypothesis if no other type is possible.
+/// every hypothesis. `none` is the probability that none of the types is right. What the search found is the only
+/// hypothesis if nothing else is possible.
 pub(super) fn possible<'a>(
     found: &SearchResult<'a>,
     candidates: &'a [Candidate],
+    none: Option<f64>,
 ) -> Vec<Possible<'a>> {
     let doubt = |types: &[(String, f64)]| types.iter().map(|(_, p)| p * (1.0 - p)).sum::<f64>();
-    let slots = (0..found.slots.len())
+    let slot = (0..found.slots.len())
         .max_by(|a, b| doubt(&found.types[*a]).total_cmp(&doubt(&found.types[*b])).then(b.cmp(a)));
-    let mut all = slots.map_or_else(Vec::new, |slot| of_slot(found, candidates, slot));
+    let mut all = slot.map_or_else(Vec::new, |slot| of_slot(found, candidates, slot));
     if all.len() < 2 {
         let kinds: Vec<&str> =
             found.chosen.iter().map(|own| candidates[own.candidate].kind.as_str()).collect();
@@ -56,7 +79,76 @@ pub(super) fn possible<'a>(
         let (system, fit) = (found.system.clone(), found.last.fit.clone());
         all = vec![Possible::of(found, &kind, 1.0, system, fit)];
     }
+    if let (Some(slot), Some(none)) = (slot, none.filter(|none| *none >= DOUBT)) {
+        let types: f64 = all.iter().map(|own| own.weight).sum();
+        for own in &mut all {
+            own.weight *= (1.0 - none) / types;
+        }
+        let free = free_form(found, slot, none, &all);
+        all.push(free);
+    }
     all
+}
+
+/// A free form in the place of one effect, on the whole response. Where nothing was measured it is at least as large as where
+/// something was, and grows from there as the `types` in its place do.
+fn free_form<'a>(
+    found: &SearchResult<'a>,
+    slot: usize,
+    weight: f64,
+    types: &[Possible<'a>],
+) -> Possible<'a> {
+    let experiment = found.system.experiment;
+    let mut effects = found.system.effects.clone();
+    let begin = experiment.parameters.len()
+        + effects[..slot].iter().map(|effect| effect.absent().len()).sum::<usize>();
+    let end = begin + effects.remove(slot).absent().len();
+    let system = System::new(experiment, effects);
+    let mut start = found.last.fit.at.point.clone();
+    start.drain(begin..end);
+    let own = fit(&system, &found.whitener, &found.means, &start);
+    let everything: Vec<Vec<usize>> =
+        experiment.curves.iter().map(|curve| curve.outputs.clone().collect()).collect();
+    let (whole, _) = planned(experiment, &found.noise, &everything, None);
+    let response = &own.at.response;
+    let scale = noise_of_mean(experiment, &found.noise, response);
+    let (scale, growth) = extended(experiment, scale, &sizes(types, response));
+    let remainder = Remainder::of_scale(&whole, &scale, &system.around(&own.at).slopes);
+    Possible::leaving(found, &remainder.grown(&growth), NONE, weight, system, own)
+}
+
+/// The mean square of what the types change of each output, beside the response without them, in its squared unit.
+fn sizes(types: &[Possible<'_>], without: &[f64]) -> Vec<f64> {
+    let all: f64 = types.iter().map(|own| own.weight).sum();
+    let square = |own: &Possible<'_>, i: usize| {
+        own.weight / all * (own.fit.at.response[i] - without[i]).powi(2)
+    };
+    (0..without.len()).map(|i| types.iter().map(|own| square(own, i)).sum()).collect()
+}
+
+/// The scale of a free form along each curve, that of the others where a curve has no data, and the factor by which it is
+/// larger at each output that was not measured: about as the changes by the types, whose mean `squares` these are.
+fn extended(
+    experiment: &Experiment<'_>,
+    mut scale: Vec<f64>,
+    squares: &[f64],
+) -> (Vec<f64>, Vec<f64>) {
+    let (mut count, mut of_scale, mut of_types) = (0.0, 0.0, f64::MIN_POSITIVE);
+    for (curve, scale) in experiment.curves.iter().zip(&scale) {
+        count += curve.measured.len() as f64;
+        of_scale += curve.measured.len() as f64 * scale * scale;
+        of_types += curve.measured.iter().map(|&i| squares[i]).sum::<f64>();
+    }
+    let mut growth = vec![1.0; squares.len()];
+    for (curve, scale) in experiment.curves.iter().zip(&mut scale) {
+        if curve.measured.is_empty() {
+            *scale = (of_scale / count).sqrt();
+        }
+        for i in curve.outputs.clone().filter(|i| !curve.measured.contains(i)) {
+            growth[i] = ((of_scale / of_types * squares[i]).sqrt() / *scale).max(1.0);
+        }
+    }
+    (scale, growth)
 }
 
 /// The best placement of each possible type in the place of one effect.
@@ -91,4 +183,33 @@ fn exchanged<'a>(
     let placed =
         |own: &Placement| own.placed(experiment, candidates, &candidates[own.candidate].kind);
     System::new(experiment, all.map(placed).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use lacuna::data::{Measurements, Replicate};
+
+    use super::extended;
+    use crate::gap::experiment::Experiment;
+    use crate::gap::testing::SyntheticExperiment;
+
+    /// Two conditions, the second without data. The types change three times as much there as where something was
+    /// measured, and a tenth at its last place.
+    #[test]
+    fn a_free_form_grows_as_the_types_where_nothing_was_measured() {
+        let world =
+            SyntheticExperiment::new(&["slow", "fast"], &["s"], 3, 0.0, &["a"], |_, _, _, _| 0.0);
+        let values = (0..6).map(|i| (i < 2).then_some(1.0)).collect();
+        let replicate = Replicate::new("1", values);
+        let measured = Measurements::new(world.layouts.blocks[0].clone(), vec![replicate]).into();
+        let experiment =
+            Experiment::new(&world.layouts, &world.parameters, &world.forward, &measured);
+        let squares = [16.0, 16.0, 64.0, 144.0, 144.0, 0.16];
+        let (scale, growth) = extended(&experiment, vec![0.2, 0.0], &squares);
+        assert!((scale[0] - 0.2).abs() < 1e-12 && (scale[1] - 0.2).abs() < 1e-12, "{scale:?}");
+        for (found, expected) in growth.iter().zip([1.0, 1.0, 2.0, 3.0, 3.0, 1.0]) {
+            assert!((found - expected).abs() < 1e-12, "{growth:?}");
+        }
+    }
 }

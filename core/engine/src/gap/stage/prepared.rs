@@ -145,8 +145,8 @@ impl<'a> PreparedSearch<'a> {
         all: &Observations,
     ) -> Result<GapResult, Stop> {
         let mut result = GapResult::of(found, self.candidates, self.options, &self.random);
-        result.insight.next =
-            after(found, self.candidates, self.wish(), &self.random.named("next"));
+        let (none, stream) = (result.verdict.none_of_these, self.random.named("next"));
+        result.insight.next = after(found, self.candidates, none, self.wish(), &stream);
         result.untried = self.untried.to_vec();
         result.verdict.reasons.extend(self.transients.iter().map(Transient::words));
         if let (Some(companion), Some(own)) =

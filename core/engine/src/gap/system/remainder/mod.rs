@@ -29,7 +29,7 @@ use super::whitener::Whitener;
 use directions::{groups, of_forms, of_group};
 use expansion::Expansion;
 
-use crate::gap::experiment::Experiment;
+use crate::gap::experiment::{Experiment, MeasuredCurve};
 use crate::gap::noise::{Noise, ResponseTangents};
 
 /// The lengths of the process, as shares of a curve.
@@ -134,18 +134,13 @@ impl Evidences {
 impl Remainder {
     /// The remainder of an experiment with this noise around a response and its changes by the unknowns.
     pub fn of(experiment: &Experiment<'_>, noise: &Noise, around: &ResponseTangents) -> Self {
-        let (counts, _) = experiment.means();
-        let sd = noise.sd(experiment, &around.response);
-        let scale: Vec<f64> = experiment
-            .curves
-            .iter()
-            .map(|curve| {
-                let square =
-                    |&i: &usize| if counts[i] > 0.0 { sd[i] * sd[i] / counts[i] } else { 0.0 };
-                let n = curve.measured.len().max(1) as f64;
-                (curve.measured.iter().map(square).sum::<f64>() / n).sqrt()
-            })
-            .collect();
+        let scale = noise_of_mean(experiment, noise, &around.response);
+        Self::of_scale(experiment, &scale, &around.slopes)
+    }
+
+    /// The same in these units, one a curve, in place of the noise of its mean; `slopes` are the changes of the response by
+    /// the unknowns, `unknowns x outputs`.
+    pub fn of_scale(experiment: &Experiment<'_>, scale: &[f64], slopes: &Matrix) -> Self {
         let ordered = |mut columns: Vec<(f64, Vec<f64>)>| {
             columns.sort_by(|a, b| b.0.total_cmp(&a.0));
             columns.truncate(DIRECTIONS);
@@ -154,14 +149,24 @@ impl Remainder {
         };
         let of_length = |share: &f64| {
             let groups = groups(experiment);
-            let each = groups
-                .iter()
-                .flat_map(|group| of_group(experiment, group, &scale, &around.slopes, *share));
+            let each =
+                groups.iter().flat_map(|group| of_group(experiment, group, scale, slopes, *share));
             ordered(each.collect())
         };
-        let forms = (experiment.forms.rows() > 0).then(|| ordered(of_forms(experiment, &scale)));
+        let forms = (experiment.forms.rows() > 0).then(|| ordered(of_forms(experiment, scale)));
         let (variances, factors) = LENGTHS.iter().map(of_length).chain(forms).unzip();
         Self { factors, variances }
+    }
+
+    /// The remainder with the values at each output multiplied by a factor.
+    #[must_use]
+    pub fn grown(mut self, by: &[f64]) -> Self {
+        for factor in &mut self.factors {
+            for k in 0..factor.rows() {
+                factor.row_mut(k).iter_mut().zip(by).for_each(|(x, by)| *x *= by);
+            }
+        }
+        self
     }
 
     /// The directions of a setting that matter beside noise, as a covariance of the mean.
@@ -307,6 +312,19 @@ impl WhiteRemainder {
         let variances: Vec<f64> = variances.iter().map(|v| v * setting.size.powi(2)).collect();
         fit(system, &whitener.with(directions, &variances), means, start)
     }
+}
+
+/// The root mean square of the noise of the mean along each curve, around a response, in its unit; zero for a curve without
+/// data.
+pub fn noise_of_mean(experiment: &Experiment<'_>, noise: &Noise, response: &[f64]) -> Vec<f64> {
+    let (counts, _) = experiment.means();
+    let sd = noise.sd(experiment, response);
+    let square = |&i: &usize| if counts[i] > 0.0 { sd[i] * sd[i] / counts[i] } else { 0.0 };
+    let of_curve = |curve: &MeasuredCurve| {
+        let n = curve.measured.len().max(1) as f64;
+        (curve.measured.iter().map(square).sum::<f64>() / n).sqrt()
+    };
+    experiment.curves.iter().map(of_curve).collect()
 }
 
 /// A fit under a remainder in the coordinates of a whitener without it.
