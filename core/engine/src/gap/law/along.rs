@@ -6,6 +6,7 @@ use lacuna::plugin::amend::Addition;
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Index, Summand};
 use lacuna_linalg::Matrix;
+use rayon::prelude::*;
 
 use super::finder::{Finder, Run};
 use super::forms::{Entry, Seen, entries};
@@ -18,7 +19,7 @@ use crate::gap::system::whitener::Whitener;
 const NUMBERS: usize = 24_000_000;
 
 /// The largest number of responses to forms that are computed at once.
-const TOGETHER: usize = 48;
+const TOGETHER: usize = 24;
 
 impl Finder<'_, '_, '_> {
     /// All forms along a run, as many as the memory allows: with fewer arguments if there are too many.
@@ -58,26 +59,24 @@ impl Finder<'_, '_, '_> {
     }
 
     /// The whitened responses to forms along a run, `forms x outputs`; zero for one that has none.
-    pub(super) fn responses(
-        &self,
-        run: &Run,
-        all: &[Entry],
-        whitener: &Whitener,
-    ) -> Option<Matrix> {
-        let mut rows = Matrix::zeros(0, self.means.len());
-        for part in all.chunks(TOGETHER) {
-            let made = self.responses_together(run, part).or_else(|| {
+    pub(super) fn responses(&self, run: &Run, all: &[Entry], whitener: &Whitener) -> Matrix {
+        let of = |part: &[Entry]| {
+            let made = self.responses_together(run, part);
+            let made = made.unwrap_or_else(|| {
                 // One form without a response spoils that of the others.
                 let mut each = Matrix::zeros(0, self.means.len());
                 for entry in part {
                     let own = self.responses_together(run, std::slice::from_ref(entry));
                     each.push_row(own.as_ref().map_or(&vec![0.0; self.means.len()], |o| o.row(0)));
                 }
-                Some(each)
-            })?;
-            whitener.whiten_rows(&made).iter_rows().for_each(|row| rows.push_row(row));
-        }
-        Some(rows)
+                each
+            });
+            whitener.whiten_rows(&made)
+        };
+        let parts: Vec<Matrix> = all.par_chunks(TOGETHER).map(of).collect();
+        let mut rows = Matrix::zeros(0, self.means.len());
+        parts.iter().flat_map(Matrix::iter_rows).for_each(|row| rows.push_row(row));
+        rows
     }
 
     fn responses_together(&self, run: &Run, part: &[Entry]) -> Option<Matrix> {

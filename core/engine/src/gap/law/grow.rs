@@ -4,6 +4,7 @@ use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::plugin::term::Index;
 use lacuna_linalg::vector::dot;
+use rayon::prelude::*;
 
 use super::along::along;
 use super::choose::{Finalist, Screen};
@@ -93,10 +94,10 @@ impl<'a> Finder<'a, '_, '_> {
         let alone = Pieces::alone(study, run.pieces.clone()).ok()??;
         let model = Widened::new(study, &alone)?;
         let all = self.dictionary(&model, run)?;
-        let white = self.responses(run, &all, trial.whitener)?;
+        let white = self.responses(run, &all, trial.whitener);
         let screen = Screen::new(&all, white, misfit, self.values)?;
         let finalists = screen.finalists(&stream.named("noise"));
-        let fits = finalists.iter().filter_map(|finalist| {
+        let fits = finalists.par_iter().filter_map(|finalist| {
             let fitted = self.refined(&model, run, finalist, trial, known, all.len())?;
             Some((finalist, fitted))
         });

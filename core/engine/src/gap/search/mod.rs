@@ -14,6 +14,7 @@ mod forward;
 mod moves;
 pub mod needless;
 mod pairs;
+mod placement_prior;
 mod places;
 mod refit;
 mod simpler;
@@ -33,9 +34,8 @@ pub use discriminate::{DiscriminatingData, Discrimination, FurtherData, discrimi
 pub use evidence::{LogEvidence, log_evidence};
 pub use explained::Explained;
 pub use forward::{search, search_observed};
-pub use refit::{
-    RefitSetting, Scored, Weighed, log_prior, most_promising, placement_prior, refit_all,
-};
+pub use placement_prior::{log_prior, placement_prior};
+pub use refit::{RefitSetting, Scored, Weighed, most_promising, refit_all};
 pub use state::kinds;
 pub use support::{Support, decides};
 pub use verdict::{

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use lacuna::math::random::Stream;
 use lacuna::plugin::effect::Reach;
+use rayon::prelude::*;
 
 use super::forward::Search;
 use super::slots::Slot;
@@ -63,7 +64,7 @@ impl<'a> Search<'a> {
         let mut dropped = Vec::new();
         while state.chosen.len() > 1 {
             let whole = state.weight(&common, stream);
-            let needless = (0..state.chosen.len() - 1).find_map(|i| {
+            let needless = (0..state.chosen.len() - 1).into_par_iter().find_map_first(|i| {
                 let smaller = state.without(&common, i);
                 (smaller.weight(&common, stream) >= whole).then_some((i, smaller))
             });

@@ -11,11 +11,11 @@ use lacuna_linalg::{Matrix, multiply_transposed};
 use rayon::prelude::*;
 
 use super::forward::Search;
-use super::refit::{RefitSetting, Weighed};
+use super::refit::{FAR, RefitSetting, Weighed};
 use super::state::SearchState;
 use super::visited::VisitedModel;
 use crate::gap::candidates::Placement;
-use crate::gap::system::fit::fit;
+use crate::gap::system::fit::{fit, fit_above};
 use crate::gap::test::{DesignMatrix, Projection};
 
 /// The number of placements of which all pairs are screened.
@@ -83,17 +83,19 @@ impl<'a> Search<'a> {
         let residual = projection.rest(&state.fit.residual);
         let parts = self.parts(&setting, state, weighed, design, projection, &residual);
         let best = screened(&parts);
+        // A pair that does not come near to the best single placement is not accurate.
+        let alone = weighed.iter().map(|one| one.fit.log_density).fold(f64::NEG_INFINITY, f64::max);
         let fitted: Vec<(f64, Pair)> = best
             .par_iter()
             .filter_map(|&(i, j, sizes)| {
-                Self::fitted(&setting, state, [&parts[i], &parts[j]], sizes)
+                Self::fitted(&setting, state, [&parts[i], &parts[j]], sizes, alone - FAR)
             })
             .collect();
         let mut order: Vec<usize> = (0..fitted.len()).collect();
         order.sort_by(|&a, &b| fitted[b].0.total_cmp(&fitted[a].0));
         order.truncate(WEIGHED);
         let mut pairs: Vec<Pair> = order
-            .into_iter()
+            .into_par_iter()
             .map(|k| {
                 let Pair { parts, .. } = &fitted[k].1;
                 let one = setting.with(&parts[0].0);
@@ -184,6 +186,7 @@ impl<'a> Search<'a> {
         state: &SearchState<'a>,
         parts: [&Part; 2],
         sizes: [f64; 2],
+        of_interest: f64,
     ) -> Option<(f64, Pair)> {
         let one = setting.with(&parts[0].placement);
         let both = RefitSetting { system: &one, ..*setting }.with(&parts[1].placement);
@@ -196,7 +199,7 @@ impl<'a> Search<'a> {
         for (x, (low, high)) in point.iter_mut().zip(&bounds) {
             *x = x.clamp(*low, *high);
         }
-        let fit = fit(&both, setting.whitener, setting.means, &point);
+        let fit = fit_above(of_interest, &both, setting.whitener, setting.means, &point);
         let prior = parts[0].log_prior + parts[1].log_prior;
         let log_weight = setting.white.glance(&fit)? + prior;
         let begin = state.fit.at.point.len();

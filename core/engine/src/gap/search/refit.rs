@@ -1,16 +1,15 @@
-//! The placements with the largest scores, refitted together with the calibrated unknowns; groups of sensors; prior
-//! masses.
+//! The placements with the largest scores, refitted together with the calibrated unknowns; groups of sensors.
 
 use std::collections::BTreeMap;
 
 use lacuna::math::random::Stream;
-use lacuna::math::special::ln_binomial;
-use lacuna::plugin::effect::{Reach, Situation};
+use lacuna::plugin::effect::Situation;
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
 use super::evidence::log_evidence;
-use crate::gap::candidates::{Candidate, Placement, log_group_share};
+use super::placement_prior::placement_prior;
+use crate::gap::candidates::{Candidate, Placement};
 use crate::gap::system::System;
 use crate::gap::system::fit::{Begun, Fit};
 use crate::gap::system::remainder::{Evidences, Setting, WhiteRemainder};
@@ -36,7 +35,7 @@ const SCORED: usize = 8;
 const STARTS: usize = 3;
 
 /// The log weight below the best that no fit under a remainder makes up for.
-const FAR: f64 = 30.0;
+pub(super) const FAR: f64 = 30.0;
 
 /// The log weight below the best from which a placement has no part in a probability that is printed, whatever the error
 /// of Laplace's method.
@@ -230,6 +229,18 @@ impl<'a> RefitSetting<'a, '_> {
     /// each. Without those for which the forward map has no response, or whose fit is singular. Fits that are far below the
     /// best one are not accurate.
     fn refitted(&self, base: &Fit, scored: &[Scored], systems: &[System<'a>]) -> Vec<Refitted<'a>> {
+        let refitted = |(i, fit): (usize, Fit)| {
+            let grid = self.white.evidences(&fit)?;
+            let (scored, system) = (scored[i].clone(), systems[i].clone());
+            let log_weight = grid.sum() + self.log_prior(&scored.placement);
+            Some(Refitted { scored, system, fit, grid, log_weight })
+        };
+        self.fits(base, scored, systems).into_par_iter().filter_map(refitted).collect()
+    }
+
+    /// The fits of placements by their indices, in ascending order. The one that is ahead after the first steps is finished
+    /// first, to tell how near to it the others have to come.
+    fn fits(&self, base: &Fit, scored: &[Scored], systems: &[System<'a>]) -> Vec<(usize, Fit)> {
         let begin = |(i, one): (usize, &Scored)| {
             let starts = self.starts(base, one, &systems[i]);
             Some((i, Begun::from(&systems[i], self.whitener, self.means, &starts)?))
@@ -249,13 +260,7 @@ impl<'a> RefitSetting<'a, '_> {
             .collect();
         fits.extend(ahead.map(|fit| (first, fit)));
         fits.sort_by_key(|(i, _)| *i);
-        let refitted = |(i, fit): (usize, Fit)| {
-            let grid = self.white.evidences(&fit)?;
-            let (scored, system) = (scored[i].clone(), systems[i].clone());
-            let log_weight = grid.sum() + self.log_prior(&scored.placement);
-            Some(Refitted { scored, system, fit, grid, log_weight })
-        };
-        fits.into_par_iter().filter_map(refitted).collect()
+        fits
     }
 
     /// The starts of a placement with the calibrated unknowns from the fit `base`.
@@ -337,46 +342,5 @@ impl<'a> RefitSetting<'a, '_> {
     /// The log prior mass of a placement within its type.
     pub fn log_prior(&self, placement: &Placement) -> f64 {
         placement_prior(self.candidates, placement, self.sensors)
-    }
-}
-
-/// The prior odds of a law against a candidate that contains it as a special case, once more for each further candidate
-/// that contains that one: most missing physics has the exponent of a textbook.
-const GENERAL: f64 = 4.0;
-
-/// The log prior mass of a placement within its type, divided among the variants of the type and among the forms from
-/// which the data chose it, plus the log of the type's share by the [odds](log_group_share) of its group.
-pub fn placement_prior(candidates: &[Candidate], placement: &Placement, sensors: usize) -> f64 {
-    let candidate = &candidates[placement.candidate];
-    let versions = candidates.iter().filter(|c| c.kind == candidate.kind).count();
-    let chosen = (!placement.on.is_empty()).then(|| chosen(placement));
-    let place = log_prior(candidate.effect.reach(), chosen, sensors) - (versions as f64).ln();
-    let form = -f64::from(generality(candidates, candidate)) * GENERAL.ln();
-    place + form - (candidate.tried as f64).ln() + log_group_share(candidates, candidate)
-}
-
-/// The number of candidates in the longest chain of special cases of a candidate, each contained in the one before.
-fn generality(candidates: &[Candidate], candidate: &Candidate) -> u32 {
-    let special = candidates.iter().filter(|c| candidate.contains.contains(&c.kind.as_str()));
-    special.map(|c| 1 + generality(candidates, c)).max().unwrap_or(0)
-}
-
-/// The number of sensors that a placement acts on, by the labels of its place.
-fn chosen(placement: &Placement) -> usize {
-    placement.on.values().map(Vec::len).product()
-}
-
-/// The log prior mass of a place within a type of effect: a third each for all sensors, for one sensor, and for a group
-/// of a size between, all sizes and all members being equally probable. `chosen` is the number of sensors; `None` for
-/// all.
-pub fn log_prior(reach: Reach, chosen: Option<usize>, sensors: usize) -> f64 {
-    let Some(chosen) = chosen.filter(|_| sensors >= 2) else {
-        return if reach == Reach::Any && sensors >= 2 { -(3.0_f64.ln()) } else { 0.0 };
-    };
-    let sets = ln_binomial(sensors as u64, chosen as u64);
-    match reach {
-        Reach::Single => -sets,
-        Reach::Any | Reach::Whole if chosen == 1 => -(3.0_f64.ln()) - sets,
-        Reach::Any | Reach::Whole => -(3.0_f64.ln()) - ((sensors.max(4) - 2) as f64).ln() - sets,
     }
 }

@@ -1,6 +1,7 @@
 //! The placements that are weighed in place of each effect, beside the others.
 
 use lacuna::math::random::Stream;
+use rayon::prelude::*;
 
 use super::diagnostics::SearchStep;
 use super::forward::Search;
@@ -58,7 +59,7 @@ impl<'a> Search<'a> {
         // The last round of exchanges, in which none was made, has weighed the slots of this state.
         let known = state.slots.as_ref().map(|slots| slots.to_vec());
         let slots: Vec<Slot<'a>> =
-            known.unwrap_or_else(|| (0..state.chosen.len()).map(slot).collect());
+            known.unwrap_or_else(|| (0..state.chosen.len()).into_par_iter().map(slot).collect());
         let common = self.setting();
         let models = slots.iter().enumerate().flat_map(|(i, Slot { smaller, weighed })| {
             let now = smaller.weight(&common, &stream.at(i as u64));

@@ -8,7 +8,8 @@
 use lacuna::plugin::effect::{On, Reach};
 use lacuna_linalg::{Matrix, multiply_transposed, multiply_vector};
 
-use super::refit::{Scored, log_prior};
+use super::placement_prior::log_prior;
+use super::refit::Scored;
 use crate::gap::candidates::{Candidate, Placement, place};
 use crate::gap::experiment::Experiment;
 use crate::gap::system::whitener::Whitener;

@@ -11,16 +11,19 @@ use super::whitener::Whitener;
 use super::window::Window;
 
 /// Smallest gain in log density that a step has to promise to be tried.
-const PROMISED: f64 = 1e-9;
+const PROMISED: f64 = 1e-11;
 
 /// Largest number of tries of a step, each with eight times the damping.
 const TRIES: usize = 10;
+
+/// A promised gain that the numerical error of a model's values may hide: a step that fails to gain it is the last one.
+const HIDDEN: f64 = 1e-3;
 
 /// Smallest damping after a failed try, relative to the curvature.
 const LEAST: f64 = 1e-4;
 
 /// Damping above which a small gain may be that of a short step, so that the fit continues.
-const SHORT: f64 = 1e-2;
+const SHORT: f64 = 1e-3;
 
 /// The share of its distance from what is of interest that a step of a fit has to gain. Far from a good fit Gauss-Newton
 /// steps gain little each, and many of them would improve a fit of which nothing depends.
@@ -161,8 +164,8 @@ impl<'a, 'b> Ascent<'a, 'b> {
         }
     }
 
-    /// A point of larger density, with the gain that was promised and the density there. A step that does not improve is repeated with more
-    /// damping: shorter, and closer to the gradient.
+    /// A point of larger density, with the gain that was promised and the density there. A step that does not improve is
+    /// repeated with more damping: shorter, and closer to the gradient.
     fn improved(&mut self) -> Option<(Vec<f64>, f64, f64)> {
         let here = &self.best.at.point;
         let plain = self.plain.unwrap_or_else(|| self.log_density(here));
@@ -176,6 +179,9 @@ impl<'a, 'b> Ascent<'a, 'b> {
             let density = self.log_density(&point);
             if self.merit(density, &point) > height {
                 return Some((point, promised, density));
+            }
+            if promised < HIDDEN && self.damping <= SHORT {
+                return None;
             }
             self.damping = (self.damping * 8.0).max(LEAST);
         }

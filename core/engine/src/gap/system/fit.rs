@@ -7,6 +7,7 @@
 use lacuna::math::distribution::Distribution;
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix, gram};
+use rayon::prelude::*;
 
 use super::ascent::{Ascent, HOPE};
 use super::coordinate::{curvature, unit};
@@ -150,7 +151,21 @@ pub fn precision(prior: &Distribution) -> f64 {
 /// unknowns' units. The density is that of the searched coordinates: the logarithm for log-uniform and log-normal
 /// priors.
 pub fn fit(system: &System<'_>, whitener: &Whitener, means: &[f64], start: &[f64]) -> Fit {
+    fit_above(f64::NEG_INFINITY, system, whitener, means, start)
+}
+
+/// Like [`fit`], but a fit that cannot come near to the log density `of_interest` is given up after some steps.
+pub fn fit_above(
+    of_interest: f64,
+    system: &System<'_>,
+    whitener: &Whitener,
+    means: &[f64],
+    start: &[f64],
+) -> Fit {
     let mut ascent = Ascent::from(system, whitener, means, start);
+    // Far from a fit the first steps may gain little.
+    ascent.climb(FIRST);
+    ascent.of_interest = of_interest;
     ascent.climb(STEPS);
     ascent.best
 }
@@ -179,7 +194,7 @@ impl<'a, 'b> Begun<'a, 'b> {
         means: &'b [f64],
         starts: &[Vec<f64>],
     ) -> Option<Self> {
-        let begun = starts.iter().map(|start| {
+        let begun = starts.par_iter().map(|start| {
             let mut ascent = Ascent::from(system, whitener, means, start);
             ascent.climb(FIRST);
             ascent
@@ -234,16 +249,15 @@ impl<'a, 'b> Begun<'a, 'b> {
 
     /// The best fit; one that stays below the log density `of_interest` need not be accurate.
     pub fn finished(self, of_interest: f64) -> Option<Fit> {
-        let ends = self.ascents.into_iter().map(|mut ascent| {
+        let climbed = self.ascents.into_par_iter().map(|mut ascent| {
             ascent.of_interest = of_interest;
             ascent.climb(STEPS);
             ascent
         });
-        let best = ends.reduce(
-            |best, next| {
-                if next.height() > best.height() + GAIN { next } else { best }
-            },
-        );
+        let ends: Vec<Ascent<'_, '_>> = climbed.collect();
+        let best = ends
+            .into_iter()
+            .reduce(|best, next| if next.height() > best.height() + GAIN { next } else { best });
         best.map(|ascent| ascent.best)
     }
 }

@@ -9,6 +9,7 @@
 use lacuna::plugin::effect::{On, Placed, Situation};
 use lacuna_linalg::vector::{dot, norm};
 use lacuna_linalg::{Matrix, multiply_transposed};
+use rayon::prelude::*;
 
 use super::projection::Projection;
 use crate::gap::candidates::{Candidate, Placement};
@@ -100,19 +101,20 @@ impl DesignMatrix {
         let mut all = Vec::new();
         let mut rows = Matrix::zeros(0, experiment.outputs());
         let mut changes = rows.clone();
-        for (c, candidate) in candidates.iter().enumerate() {
-            let own: Vec<usize> =
-                (0..placements.len()).filter(|&s| placements[s].candidate == c).collect();
+        let of = |(c, candidate): (usize, &Candidate)| -> Vec<Kept> {
             let slopes = slopes(system, fit, candidate, situation);
-            for s in own {
+            let own = (0..placements.len()).filter(|&s| placements[s].candidate == c);
+            let each = own.flat_map(|s| {
                 let placed = placements[s].placed(experiment, candidates, "");
-                let kept = Self::one(s, &placed, &slopes, whitener, projection);
-                for one in kept {
-                    all.push(one.regressor);
-                    rows.push_row(&one.left);
-                    changes.push_row(&one.change);
-                }
-            }
+                Self::one(s, &placed, &slopes, whitener, projection)
+            });
+            each.collect()
+        };
+        let kept: Vec<Vec<Kept>> = candidates.par_iter().enumerate().map(of).collect();
+        for one in kept.into_iter().flatten() {
+            all.push(one.regressor);
+            rows.push_row(&one.left);
+            changes.push_row(&one.change);
         }
         let common = common(experiment, whitener, &rows);
         Self { regressors: all, rows, common, changes }
