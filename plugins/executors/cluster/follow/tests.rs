@@ -258,7 +258,7 @@ fn a_reason_to_wait_for_ever_is_told_once() {
     // Another process makes the runs while they wait.
     let place = folder.path().to_owned();
     let maker = std::thread::spawn(move || {
-        std::thread::sleep(Duration::from_millis(300));
+        std::thread::sleep(Duration::from_secs(2));
         make_all(&place.join("campaign/1"), &Line {});
     });
     let ran = ran(&stub, folder.path());

@@ -8,10 +8,10 @@ use crate::readers::sierra::write::{History, Origin, write_history};
 #[test]
 fn a_command_that_hangs_is_stopped_with_all_it_started() {
     let script = "echo 'step 1' >&2; (sleep 30; touch {{ study }}/later) & sleep 30";
-    let case = Case::shell(script, "timeout = 0.5");
+    let case = Case::shell(script, "timeout = 2");
     let begun = Instant::now();
-    assert_eq!(case.reason(), "`sh` was stopped after 0.5 s; it said: step 1");
-    assert!(begun.elapsed() < Duration::from_secs(10));
+    assert_eq!(case.reason(), "`sh` was stopped after 2 s; it said: step 1");
+    assert!(begun.elapsed() < Duration::from_secs(25));
     let study = case.study.path().display().to_string();
     let running = || {
         let processes = std::fs::read_dir("/proc").unwrap().flatten();
@@ -22,7 +22,7 @@ fn a_command_that_hangs_is_stopped_with_all_it_started() {
         processes.filter(ours).count()
     };
     // A busy machine needs a moment to end a killed process.
-    while running() > 0 && begun.elapsed() < Duration::from_secs(10) {
+    while running() > 0 && begun.elapsed() < Duration::from_secs(25) {
         std::thread::sleep(Duration::from_millis(20));
     }
     assert_eq!(running(), 0);

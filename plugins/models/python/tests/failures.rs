@@ -49,11 +49,11 @@ fn what_goes_wrong_costs_one_run() {
 fn a_function_that_hangs_is_stopped() {
     let text =
         "import time\ndef simulate(a, b):\n    time.sleep(60 if a == 2 else 0)\n    return [b] * 6";
-    let Some(case) = Case::new(text, "timeout = 0.7") else { return };
+    let Some(case) = Case::new(text, "timeout = 3") else { return };
     assert_eq!(case.at([1.0, 0.5]).unwrap(), [0.5; 6]);
     let begun = Instant::now();
-    assert_eq!(case.reason(), "`simulate` in `model.py` was stopped after 0.7 s");
-    assert!(begun.elapsed() < Duration::from_secs(10));
+    assert_eq!(case.reason(), "`simulate` in `model.py` was stopped after 3 s");
+    assert!(begun.elapsed() < Duration::from_secs(40));
     assert_eq!(case.at([1.0, 0.5]).unwrap(), [0.5; 6]);
 }
 
