@@ -39,7 +39,7 @@ pub struct Insight {
 /// Information that further data are expected to give.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Next {
-    /// Types that the name may be, with their posterior probabilities among these; empty if there is no choice.
+    /// Types that the name may be, and `none of these`, with their posterior probabilities; empty if there is no choice.
     #[schemars(extend("propertyNames" = { "title": "type" }))]
     pub names: ByName<Quantity>,
     /// Purpose by which the options are ranked, per cost: the name if there is a choice, or else the quantity if the study states
