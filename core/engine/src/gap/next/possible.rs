@@ -111,10 +111,19 @@ fn free_form<'a>(
         experiment.curves.iter().map(|curve| curve.outputs.clone().collect()).collect();
     let (whole, _) = planned(experiment, &found.noise, &everything, None);
     let response = &own.at.response;
+    // As large as the gap, so that the data at hand speak neither for the types nor for the free form.
+    let gap = root_mean_square(&own.residual, experiment).max(1.0);
     let scale = noise_of_mean(experiment, &found.noise, response);
+    let scale = scale.into_iter().map(|noise| gap * noise).collect();
     let (scale, growth) = extended(experiment, scale, &sizes(types, response));
     let remainder = Remainder::of_scale(&whole, &scale, &system.around(&own.at).slopes);
     Possible::leaving(found, &remainder.grown(&growth), NONE, weight, system, own)
+}
+
+/// The root mean square of whitened values over the measured ones.
+fn root_mean_square(white: &[f64], experiment: &Experiment<'_>) -> f64 {
+    let measured: usize = experiment.curves.iter().map(|curve| curve.measured.len()).sum();
+    (white.iter().map(|z| z * z).sum::<f64>() / measured.max(1) as f64).sqrt()
 }
 
 /// The mean square of what the types change of each output, beside the response without them, in its squared unit.
