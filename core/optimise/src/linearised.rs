@@ -76,13 +76,13 @@ fn settle<'a>(
     near: &mut Box<dyn Target + 'a>,
     regions: &[Region],
 ) -> usize {
-    let mut ahead = Ahead::of(&**near, point, regions, 1.0);
+    let mut ahead = Tangent::new(&**near, point, regions).ahead(1.0);
     for tried in 0..SETTLING {
         if !(SETTLED..NEAR).contains(&ahead.predicted) {
             return tried;
         }
         let Some(there) = target.linearised(&ahead.top) else { return tried + 1 };
-        let next = Ahead::of(&*there, &ahead.top, regions, 1.0);
+        let next = Tangent::new(&*there, &ahead.top, regions).ahead(1.0);
         let is_nearer = next.predicted < 0.5 * ahead.predicted;
         if !is_nearer {
             return tried + 1;
@@ -93,21 +93,35 @@ fn settle<'a>(
     SETTLING
 }
 
-/// The maximum of a linearised density in a box about a point.
+/// A linearised density at its point.
+struct Tangent<'a> {
+    near: &'a dyn Target,
+    point: &'a [f64],
+    regions: &'a [Region],
+    present: f64,
+    slopes: Vec<f64>,
+    scales: Vec<f64>,
+}
+
+/// The maximum of a linearised density in a box about its point.
 struct Ahead {
     top: Vec<f64>,
     /// The gain in log density that it predicts.
     predicted: f64,
 }
 
-impl Ahead {
-    fn of(near: &dyn Target, point: &[f64], regions: &[Region], radius: f64) -> Self {
+impl<'a> Tangent<'a> {
+    fn new(near: &'a dyn Target, point: &'a [f64], regions: &'a [Region]) -> Self {
         let (present, slopes) = near.gradient(point);
         let scales = laplace::scales(near, point, regions);
-        let inside = around(&near.bounds(), point, regions, radius);
-        let search = Scaled::inside(near, inside, point, &scales);
-        let found = search.maximise(present, &slopes, FINEST);
-        Self { top: found.point, predicted: found.value - present }
+        Self { near, point, regions, present, slopes, scales }
+    }
+
+    fn ahead(&self, radius: f64) -> Ahead {
+        let inside = around(&self.near.bounds(), self.point, self.regions, radius);
+        let search = Scaled::inside(self.near, inside, self.point, &self.scales);
+        let found = search.maximise(self.present, &self.slopes, FINEST);
+        Ahead { top: found.point, predicted: found.value - self.present }
     }
 }
 
@@ -128,11 +142,11 @@ fn step(
     regions: &[Region],
     radius: &mut f64,
 ) -> Option<Step> {
-    let present = near.gradient(point).0;
+    let tangent = Tangent::new(near, point, regions);
     for tried in 1..=TRIES {
-        let Ahead { top: next, predicted } = Ahead::of(near, point, regions, *radius);
+        let Ahead { top: next, predicted } = tangent.ahead(*radius);
         // Also false for a NaN.
-        let is_enough = predicted > ROUNDING * present.abs().max(1.0);
+        let is_enough = predicted > ROUNDING * tangent.present.abs().max(1.0);
         if !is_enough {
             return None;
         }
