@@ -8,6 +8,8 @@
 
 pub mod values;
 
+use std::borrow::Cow;
+
 use lacuna_linalg::{Matrix, multiply, thin_qr, transposed_multiply};
 
 use super::words::{percent, short};
@@ -106,17 +108,21 @@ fn worst(
     left_out: Option<&LeftOut>,
     kept: &[usize],
 ) -> Option<(usize, f64)> {
-    let (points, responses) = (points.select_rows(kept), responses.select_rows(kept));
-    let fit = Fit::best(&points, &responses)?;
+    // Of many runs a copy of all responses would take hundreds of megabytes.
+    let responses = if kept.len() == responses.rows() {
+        Cow::Borrowed(responses)
+    } else {
+        Cow::Owned(responses.select_rows(kept))
+    };
+    let fit = Fit::best(&points.select_rows(kept), &responses)?;
     let sizes = sizes(&responses);
-    let mut scores = scores(&fit.residuals, &fit.leverage, &sizes);
+    let mut scores = scores(|i, j| fit.residuals[(i, j)], &fit.leverage, &sizes);
     if let Some(LeftOut { errors, sizes: expected }) = left_out {
         // The emulator was fitted with all runs, so only the first outlier is judged by it.
         if kept.len() == errors.rows() {
-            let scaled = Matrix::from_fn(errors.rows(), errors.columns(), |i, j| {
-                errors[(i, j)] / expected[i] * (1.0 - fit.leverage[i])
-            });
-            let emulator = self::scores(&scaled, &fit.leverage, &sizes);
+            let scaled =
+                |i: usize, j: usize| errors[(i, j)] / expected[i] * (1.0 - fit.leverage[i]);
+            let emulator = self::scores(scaled, &fit.leverage, &sizes);
             for (score, other) in scores.iter_mut().zip(emulator) {
                 *score = score.max(other);
             }
@@ -145,11 +151,11 @@ fn sizes(responses: &Matrix) -> Vec<f64> {
 
 /// Residual of each run, scaled by its leverage, relative to the root mean square of all others; all outputs together,
 /// each in units of its own residuals.
-fn scores(residuals: &Matrix, leverage: &[f64], sizes: &[f64]) -> Vec<f64> {
-    let n = residuals.rows();
+fn scores(residual: impl Fn(usize, usize) -> f64, leverage: &[f64], sizes: &[f64]) -> Vec<f64> {
+    let n = leverage.len();
     let mut square = vec![0.0; n];
     for (j, &size) in sizes.iter().enumerate().filter(|(_, size)| **size > 0.0) {
-        let scaled = |i: usize| residuals[(i, j)].powi(2) / (1.0 - leverage[i]).max(1e-6);
+        let scaled = |i: usize| residual(i, j).powi(2) / (1.0 - leverage[i]).max(1e-6);
         let mut all: Vec<f64> = (0..n).map(scaled).collect();
         let floor = (ROUNDING * size).powi(2);
         let unit = {
@@ -205,10 +211,9 @@ impl Fit {
         let leverage: Vec<f64> =
             qr.q.iter_rows().map(|row| row.iter().map(|q| q * q).sum::<f64>().min(1.0)).collect();
         let projected = transposed_multiply(&qr.q, responses);
-        let fitted = multiply(&qr.q, &projected);
-        let residuals = Matrix::from_fn(responses.rows(), responses.columns(), |i, j| {
-            responses[(i, j)] - fitted[(i, j)]
-        });
+        let mut residuals = multiply(&qr.q, &projected);
+        let pairs = residuals.as_mut_slice().iter_mut().zip(responses.as_slice());
+        pairs.for_each(|(fitted, response)| *fitted = response - *fitted);
         let mut coefficients = projected;
         lacuna_linalg::solve_upper_matrix(&qr.r, &mut coefficients);
         Some(Self { residuals, leverage, coefficients: (degree, coefficients) })
