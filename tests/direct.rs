@@ -3,6 +3,11 @@
 use std::fs;
 use std::path::Path;
 
+use lacuna::plugin::Forward;
+use lacuna_engine::stage::direct::ModelMap;
+use lacuna_engine::study::resolve::load_text;
+use lacuna_linalg::Matrix;
+
 use crate::quick;
 
 const STUDY: &str = r#"
@@ -90,4 +95,53 @@ fn the_best_fit_is_kept() {
     assert!(!other.join("5-calibrate-best-fit").exists());
     let search = 2 * first - calls(folder.path());
     assert!(search < 1500, "the search takes {search} runs of the model");
+}
+
+const DECAY: &str = r#"
+[study]
+name = "decay"
+title = "Two decays"
+seed = 3
+
+[[parameter]]
+name = "rate"
+unit = "1/s"
+prior = { uniform = [0.1, 2.0] }
+
+[response]
+name = "y"
+axes = { kind = ["fast", "slow"], time = { first = 0.5, last = 5.0, count = 10, unit = "s" } }
+
+[model]
+use = "equations"
+state = { a = 1, b = 1 }
+rate = { a = "-2 * rate * a", b = "-rate * b" }
+observe = { fast = "a", slow = "b" }
+
+[forward]
+"#;
+
+/// Closed form: `exp(-k rate t)`. Where only times up to 1.5 s are needed, the equations are integrated as far as there: the
+/// values beyond are the last ones.
+#[test]
+fn equations_are_integrated_as_far_as_is_needed() {
+    let checked = load_text(Path::new("study.toml"), DECAY, &[]);
+    let complaints = checked.complaints();
+    let study = checked.study.unwrap_or_else(|| panic!("{complaints}"));
+    let map = ModelMap::of(&study).unwrap();
+    let mut needed = [false; 20];
+    needed[0] = true;
+    needed[12] = true;
+    let rate = 0.7;
+    let mean = map.mean_at(&needed, &Matrix::from_vec(1, 1, vec![rate]));
+    let (also, slopes) = map.mean_and_jacobian_at(&needed, &[rate], &[0]);
+    for i in 0..20 {
+        let (k, t) = (if i < 10 { 2.0 } else { 1.0 }, 0.5 * (1 + i % 10) as f64);
+        let until = t.min(1.5);
+        let exact = f64::exp(-k * rate * until);
+        assert!((mean[(0, i)] - exact).abs() < 1e-5, "{i}: {} {exact}", mean[(0, i)]);
+        assert!((also[i] - exact).abs() < 1e-5, "{i}: {} {exact}", also[i]);
+        let slope = if t > 1.5 { 0.0 } else { -k * t * exact };
+        assert!((slopes[(i, 0)] - slope).abs() < 1e-4, "{i}: {} {slope}", slopes[(i, 0)]);
+    }
 }

@@ -35,6 +35,22 @@ pub trait Forward: Send + Sync {
         (mean, jacobian.select_columns(parameters))
     }
 
+    /// Like [`Forward::mean`], where only some of the outputs are needed; the others may be any finite numbers.
+    fn mean_at(&self, _needed: &[bool], points: &Matrix) -> Matrix {
+        self.mean(points)
+    }
+
+    /// Like [`Forward::mean_and_jacobian_by`], where only some of the outputs are needed; the others may be any finite
+    /// numbers.
+    fn mean_and_jacobian_at(
+        &self,
+        _needed: &[bool],
+        point: &[f64],
+        parameters: &[usize],
+    ) -> (Vec<f64>, Matrix) {
+        self.mean_and_jacobian_by(point, parameters)
+    }
+
     /// Returns true if the response of the same point is another one with other random numbers.
     fn is_stochastic(&self) -> bool {
         false

@@ -1,5 +1,7 @@
 //! Route without a surrogate: the model itself is the forward map.
 
+mod beginning;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -343,6 +345,24 @@ impl Forward for ModelMap<'_> {
         }
         let (mean, jacobian) = self.mean_and_jacobian(point);
         (mean, jacobian.select_columns(parameters))
+    }
+
+    fn mean_at(&self, needed: &[bool], points: &Matrix) -> Matrix {
+        self.mean_of_beginnings(needed, points).unwrap_or_else(|| self.mean(points))
+    }
+
+    fn mean_and_jacobian_at(
+        &self,
+        needed: &[bool],
+        point: &[f64],
+        parameters: &[usize],
+    ) -> (Vec<f64>, Matrix) {
+        let gradient = self.simulator.model.gradient();
+        let both = gradient.and_then(|own| self.derivatives_of_beginnings(needed, own, point));
+        match both {
+            Some((mean, jacobian)) => (mean, jacobian.select_columns(parameters)),
+            None => self.mean_and_jacobian_by(point, parameters),
+        }
     }
 
     fn failure(&self) -> Option<String> {

@@ -1,6 +1,7 @@
 //! The study's model as a function of the study's parameters, in the study's units.
 
 mod asked;
+mod source;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -16,6 +17,7 @@ use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, multiply};
 
 use asked::{asked, folder, shaped};
+use source::{Source, source};
 
 use crate::study::Study;
 use crate::study::file::ModelKeys;
@@ -73,30 +75,8 @@ pub struct Setting<'a> {
     random: Stream,
 }
 
-/// Source of an input's value.
-enum Source {
-    Fixed(f64),
-    /// Index of a parameter of the study and the factor from its unit to the input's.
-    Parameter(usize, f64),
-    /// Index of an expression and the factor from its unit to the input's.
-    Computed(usize, f64),
-    /// The seed of the run.
-    Seed,
-}
-
 /// Number of different seeds: those that a signed integer of 32 bits holds, without zero.
 const SEEDS: u64 = (1 << 31) - 1;
-
-impl Source {
-    /// Parameters on which the value depends; for an expression, those of all expressions.
-    fn parameters(&self, computed: Option<&Computed>) -> Vec<usize> {
-        match self {
-            Self::Fixed(_) | Self::Seed => Vec::new(),
-            Self::Parameter(i, _) => vec![*i],
-            Self::Computed(..) => computed.map_or_else(Vec::new, |all| all.parameters.clone()),
-        }
-    }
-}
 
 impl<'a> Simulator<'a> {
     /// The simulator of a study; `None` if it has no model.
@@ -182,8 +162,7 @@ impl<'a> Simulator<'a> {
 
     /// Response to one scenario at a point, in the study's unit.
     pub fn respond_to(&self, setting: &Setting<'_>, point: &[f64]) -> Result<Response, EvalError> {
-        let inputs = setting.inputs(point);
-        setting.checked(self.model.predict(&self.call(setting, &inputs)))
+        self.respond_on(&setting.asked, setting, point)
     }
 
     /// Rejects a point at which an input leaves the model's range in one of these settings.
@@ -215,14 +194,38 @@ impl<'a> Simulator<'a> {
         gradient: &dyn Gradient,
         point: &[f64],
     ) -> Result<(Response, Matrix), EvalError> {
+        self.with_derivatives_on(&setting.asked, setting, gradient, point)
+    }
+
+    /// The same on another layout than that of the setting.
+    pub fn with_derivatives_on(
+        &self,
+        layout: &Layout,
+        setting: &Setting<'_>,
+        gradient: &dyn Gradient,
+        point: &[f64],
+    ) -> Result<(Response, Matrix), EvalError> {
         let inputs = setting.inputs(point);
-        let call = self.call(setting, &inputs);
-        let Some(both) = gradient.with_response(&call) else {
-            let response = setting.checked(self.model.predict(&call))?;
-            return Ok((response, self.jacobian(setting, gradient, point)?));
+        let call = Call { layout, ..self.call(setting, &inputs) };
+        let (response, jacobian) = match gradient.with_response(&call) {
+            Some(both) => both?,
+            None => (self.model.predict(&call)?, gradient.jacobian(&call)?),
         };
-        let (response, jacobian) = both?;
-        Ok((setting.checked(Ok(response))?, setting.by_parameters(&jacobian, point)))
+        shaped(&jacobian, layout.len(), inputs.len())?;
+        let response = setting.checked_on(layout, Ok(response))?;
+        Ok((response, setting.by_parameters(&jacobian, point)))
+    }
+
+    /// Response to one scenario at a point on another layout than that of the setting, in the study's unit.
+    pub fn respond_on(
+        &self,
+        layout: &Layout,
+        setting: &Setting<'_>,
+        point: &[f64],
+    ) -> Result<Response, EvalError> {
+        let inputs = setting.inputs(point);
+        let call = Call { layout, ..self.call(setting, &inputs) };
+        setting.checked_on(layout, self.model.predict(&call))
     }
 
     /// Derivatives of the response to one scenario by the study's parameters (`outputs x parameters`), in the study's
@@ -339,61 +342,27 @@ impl Setting<'_> {
 
     /// The response in the study's unit, checked for finite values and for their number.
     pub fn checked(&self, response: Result<Response, EvalError>) -> Result<Response, EvalError> {
+        self.checked_on(&self.asked, response)
+    }
+
+    fn checked_on(
+        &self,
+        layout: &Layout,
+        response: Result<Response, EvalError>,
+    ) -> Result<Response, EvalError> {
         let mut response = response?;
-        let (found, asked) = (response.values.len(), self.asked.len());
+        let (found, asked) = (response.values.len(), layout.len());
         if found != asked {
             let text = format!("the response has {found} values, expected {asked}");
             return Err(EvalError::Fatal(text));
         }
         for (i, value) in response.values.iter_mut().enumerate() {
             if !value.is_finite() {
-                let place = self.asked.describe(i);
+                let place = layout.describe(i);
                 return Err(EvalError::Rejected(format!("the response is {value} at {place}")));
             }
             *value *= self.factor;
         }
         Ok(response)
     }
-}
-
-fn source(
-    study: &Study,
-    other: &Other<'_>,
-    scenario: usize,
-    computed: Option<&Computed>,
-    input: &Input,
-) -> Result<Source, Stop> {
-    let no_unit =
-        || Stop::new(format!("the unit of `{}` does not convert to that of the model", input.name));
-    let keys = [Some(other.section), study.model.as_ref()].into_iter().flatten();
-    let mut seeds = keys.filter_map(|section| section.common.seed.as_ref());
-    if seeds.any(|name| name.as_str() == input.name) {
-        return Ok(Source::Seed);
-    }
-    if let Some(k) = other.free.iter().position(|(name, _)| *name == input.name) {
-        let factor = other.free[k].1.factor_to(&input.unit).ok_or_else(no_unit)?;
-        return Ok(Source::Parameter(study.parameters.len() + k, factor));
-    }
-    if let Some(computed) = computed
-        && let Some(k) = computed.names.iter().position(|name| name == &input.name)
-    {
-        let factor = computed.units[k].factor_to(&input.unit).ok_or_else(no_unit)?;
-        return Ok(Source::Computed(k, factor));
-    }
-    let mut unknowns = study.unknowns.iter();
-    if let Some(i) = unknowns.position(|u| u.name == input.name && u.acts_in(scenario)) {
-        let factor = study.parameters[i].unit.factor_to(&input.unit).ok_or_else(no_unit)?;
-        return Ok(Source::Parameter(i, factor));
-    }
-    if let Some(condition) = study.scenarios[scenario].value(&input.name) {
-        let unit = condition.unit.as_ref().unwrap_or(&input.unit);
-        let value = unit.convert(condition.value, &input.unit).ok_or_else(no_unit)?;
-        return Ok(Source::Fixed(value));
-    }
-    let of_study = || study.model.as_ref()?.common.fixed.get(&input.name);
-    if let Some(quantity) = other.section.common.fixed.get(&input.name).or_else(of_study) {
-        return quantity.in_unit(&input.unit).map(Source::Fixed).ok_or_else(no_unit);
-    }
-    let default = input.default.map(Source::Fixed);
-    default.ok_or_else(|| Stop::new(format!("nothing sets the input `{}`", input.name)))
 }

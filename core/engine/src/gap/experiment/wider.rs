@@ -51,6 +51,15 @@ impl Reordered<'_> {
         let unknowns = own.end..own.end + self.unknowns;
         own.chain(inputs).chain(unknowns).collect()
     }
+
+    /// The point of the inner map, and the columns of these parameters in it.
+    fn inner(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Vec<usize>) {
+        let order = self.order();
+        let moved = order.iter().map(|&i| point[i]).collect();
+        let mut back = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(k, &i)| back[i] = k);
+        (moved, parameters.iter().map(|&i| back[i]).collect())
+    }
 }
 
 impl Forward for Reordered<'_> {
@@ -75,13 +84,23 @@ impl Forward for Reordered<'_> {
         self.mean_and_jacobian_by(point, &all)
     }
 
+    fn mean_at(&self, needed: &[bool], points: &Matrix) -> Matrix {
+        self.forward.mean_at(needed, &points.select_columns(&self.order()))
+    }
+
     fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
-        let order = self.order();
-        let moved: Vec<f64> = order.iter().map(|&i| point[i]).collect();
-        let mut back = vec![0; order.len()];
-        order.iter().enumerate().for_each(|(k, &i)| back[i] = k);
-        let inner: Vec<usize> = parameters.iter().map(|&i| back[i]).collect();
-        self.forward.mean_and_jacobian_by(&moved, &inner)
+        let (point, parameters) = self.inner(point, parameters);
+        self.forward.mean_and_jacobian_by(&point, &parameters)
+    }
+
+    fn mean_and_jacobian_at(
+        &self,
+        needed: &[bool],
+        point: &[f64],
+        parameters: &[usize],
+    ) -> (Vec<f64>, Matrix) {
+        let (point, parameters) = self.inner(point, parameters);
+        self.forward.mean_and_jacobian_at(needed, &point, &parameters)
     }
 
     fn failure(&self) -> Option<String> {

@@ -37,6 +37,50 @@ impl<'a> WithEffects<'a> {
             (effect, &point[own])
         })
     }
+
+    /// The inner map's part of points.
+    fn own(&self, points: &Matrix) -> Matrix {
+        points.select_columns(&(0..self.forward.dimension()).collect::<Vec<_>>())
+    }
+
+    /// Responses of the inner map with the effects at these points.
+    fn applied(&self, mut means: Matrix, points: &Matrix) -> Matrix {
+        for i in 0..means.rows() {
+            let point = points.row(i);
+            let parameters = &point[..self.forward.dimension()];
+            let response =
+                self.placed(point).fold(means.row(i).to_vec(), |response, (effect, values)| {
+                    effect.apply(&response, values, parameters)
+                });
+            means.row_mut(i).copy_from_slice(&response);
+        }
+        means
+    }
+
+    /// Those of these parameters that are the inner map's.
+    fn own_of(&self, parameters: &[usize]) -> Vec<usize> {
+        parameters.iter().copied().filter(|&i| i < self.forward.dimension()).collect()
+    }
+
+    /// The response of the inner map and its derivatives by its own among these parameters, with the effects, and by all of
+    /// these parameters.
+    fn on_top(
+        &self,
+        (mean, jacobian): (Vec<f64>, Matrix),
+        point: &[f64],
+        parameters: &[usize],
+    ) -> (Vec<f64>, Matrix) {
+        let (d, own) = (self.forward.dimension(), jacobian.columns());
+        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian, &point[..d]);
+        // The derivatives by all unknowns of the effects come after those that were asked for.
+        let mut seen = 0;
+        let column = |&i: &usize| {
+            seen += usize::from(i < d);
+            if i < d { seen - 1 } else { own + i - d }
+        };
+        let columns: Vec<usize> = parameters.iter().map(column).collect();
+        (response, tangents.transposed().select_columns(&columns))
+    }
 }
 
 impl Forward for WithEffects<'_> {
@@ -49,18 +93,11 @@ impl Forward for WithEffects<'_> {
     }
 
     fn mean(&self, points: &Matrix) -> Matrix {
-        let own: Vec<usize> = (0..self.forward.dimension()).collect();
-        let mut means = self.forward.mean(&points.select_columns(&own));
-        for i in 0..means.rows() {
-            let point = points.row(i);
-            let parameters = &point[..own.len()];
-            let response =
-                self.placed(point).fold(means.row(i).to_vec(), |response, (effect, values)| {
-                    effect.apply(&response, values, parameters)
-                });
-            means.row_mut(i).copy_from_slice(&response);
-        }
-        means
+        self.applied(self.forward.mean(&self.own(points)), points)
+    }
+
+    fn mean_at(&self, needed: &[bool], points: &Matrix) -> Matrix {
+        self.applied(self.forward.mean_at(needed, &self.own(points)), points)
     }
 
     fn jacobian(&self, point: &[f64]) -> Matrix {
@@ -75,18 +112,20 @@ impl Forward for WithEffects<'_> {
     }
 
     fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
-        let d = self.forward.dimension();
-        let own: Vec<usize> = parameters.iter().copied().filter(|&i| i < d).collect();
-        let (mean, jacobian) = self.forward.mean_and_jacobian_by(&point[..d], &own);
-        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian, &point[..d]);
-        // The derivatives by all unknowns of the effects come after those that were asked for.
-        let mut seen = 0;
-        let column = |&i: &usize| {
-            seen += usize::from(i < d);
-            if i < d { seen - 1 } else { own.len() + i - d }
-        };
-        let columns: Vec<usize> = parameters.iter().map(column).collect();
-        (response, tangents.transposed().select_columns(&columns))
+        let own = self.own_of(parameters);
+        let inner = self.forward.mean_and_jacobian_by(&point[..self.forward.dimension()], &own);
+        self.on_top(inner, point, parameters)
+    }
+
+    fn mean_and_jacobian_at(
+        &self,
+        needed: &[bool],
+        point: &[f64],
+        parameters: &[usize],
+    ) -> (Vec<f64>, Matrix) {
+        let (d, own) = (self.forward.dimension(), self.own_of(parameters));
+        let inner = self.forward.mean_and_jacobian_at(needed, &point[..d], &own);
+        self.on_top(inner, point, parameters)
     }
 
     fn failure(&self) -> Option<String> {

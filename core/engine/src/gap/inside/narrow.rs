@@ -66,6 +66,43 @@ impl<'a> RestrictedMap<'a> {
         let d = self.study.parameters.len();
         point[..d].iter().copied().chain(inputs.iter().map(|i| point[d + i])).collect()
     }
+
+    /// The responses at points, each by the model with its own pieces.
+    fn means(&self, points: &Matrix, mean: impl Fn(&ModelMap<'a>, &Matrix) -> Matrix) -> Matrix {
+        let mut all = Matrix::zeros(points.rows(), self.outputs());
+        let mut groups: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
+        for (i, point) in points.iter_rows().enumerate() {
+            let present = self.present(point, &[]);
+            match groups.iter_mut().find(|(pieces, _)| *pieces == present) {
+                Some((_, rows)) => rows.push(i),
+                None => groups.push((present, vec![i])),
+            }
+        }
+        for (present, rows) in groups {
+            let (part, inputs) = self.part(&present);
+            let own = rows.iter().map(|&i| self.narrowed(points.row(i), inputs));
+            let means = mean(part, &Matrix::from_rows(part.dimension(), own));
+            for (&i, mean) in rows.iter().zip(means.iter_rows()) {
+                all.row_mut(i).copy_from_slice(mean);
+            }
+        }
+        all
+    }
+
+    /// The model with the pieces of a point and of these parameters, with its own point and their columns in it.
+    fn of_part(
+        &self,
+        point: &[f64],
+        parameters: &[usize],
+    ) -> (&ModelMap<'a>, Vec<f64>, Vec<usize>) {
+        let d = self.study.parameters.len();
+        let (part, inputs) = self.part(&self.present(point, parameters));
+        let column = |&i: &usize| match i.checked_sub(d) {
+            Some(input) => inputs.iter().position(|own| *own == input).map_or(0, |k| d + k),
+            None => i,
+        };
+        (part, self.narrowed(point, inputs), parameters.iter().map(column).collect())
+    }
 }
 
 fn direct<'a>(
@@ -89,24 +126,11 @@ impl Forward for RestrictedMap<'_> {
     }
 
     fn mean(&self, points: &Matrix) -> Matrix {
-        let mut all = Matrix::zeros(points.rows(), self.outputs());
-        let mut groups: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
-        for (i, point) in points.iter_rows().enumerate() {
-            let present = self.present(point, &[]);
-            match groups.iter_mut().find(|(pieces, _)| *pieces == present) {
-                Some((_, rows)) => rows.push(i),
-                None => groups.push((present, vec![i])),
-            }
-        }
-        for (present, rows) in groups {
-            let (part, inputs) = self.part(&present);
-            let own = rows.iter().map(|&i| self.narrowed(points.row(i), inputs));
-            let means = part.mean(&Matrix::from_rows(part.dimension(), own));
-            for (&i, mean) in rows.iter().zip(means.iter_rows()) {
-                all.row_mut(i).copy_from_slice(mean);
-            }
-        }
-        all
+        self.means(points, Forward::mean)
+    }
+
+    fn mean_at(&self, needed: &[bool], points: &Matrix) -> Matrix {
+        self.means(points, |part, own| part.mean_at(needed, own))
     }
 
     fn jacobian(&self, point: &[f64]) -> Matrix {
@@ -119,14 +143,18 @@ impl Forward for RestrictedMap<'_> {
     }
 
     fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
-        let d = self.study.parameters.len();
-        let (part, inputs) = self.part(&self.present(point, parameters));
-        let column = |&i: &usize| match i.checked_sub(d) {
-            Some(input) => inputs.iter().position(|own| *own == input).map_or(0, |k| d + k),
-            None => i,
-        };
-        let columns: Vec<usize> = parameters.iter().map(column).collect();
-        part.mean_and_jacobian_by(&self.narrowed(point, inputs), &columns)
+        let (part, point, columns) = self.of_part(point, parameters);
+        part.mean_and_jacobian_by(&point, &columns)
+    }
+
+    fn mean_and_jacobian_at(
+        &self,
+        needed: &[bool],
+        point: &[f64],
+        parameters: &[usize],
+    ) -> (Vec<f64>, Matrix) {
+        let (part, point, columns) = self.of_part(point, parameters);
+        part.mean_and_jacobian_at(needed, &point, &columns)
     }
 
     fn failure(&self) -> Option<String> {

@@ -58,6 +58,21 @@ impl<F: std::ops::Deref<Target: Forward> + Send + Sync> Forward for Counted<'_, 
         self.forward.mean_and_jacobian_by(point, parameters)
     }
 
+    fn mean_at(&self, needed: &[bool], points: &Matrix) -> Matrix {
+        self.progress.add(points.rows() as u64);
+        self.forward.mean_at(needed, points)
+    }
+
+    fn mean_and_jacobian_at(
+        &self,
+        needed: &[bool],
+        point: &[f64],
+        parameters: &[usize],
+    ) -> (Vec<f64>, Matrix) {
+        self.progress.add(1);
+        self.forward.mean_and_jacobian_at(needed, point, parameters)
+    }
+
     fn linear(&self) -> Option<&dyn Linear> {
         self.forward.linear()
     }

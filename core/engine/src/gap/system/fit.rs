@@ -229,7 +229,8 @@ impl<'a, 'b> Begun<'a, 'b> {
         for share in WINDOWS {
             let window = Window::of(system, share);
             let inside = (values - window.beyond()) as f64;
-            let mut ascent = Ascent::inside(system, whitener, means, &point, Some(window));
+            let own = window.of_system(system);
+            let mut ascent = Ascent::inside(&own, whitener, means, &point, Some(window));
             let largest = PROMISING * nearest.best.misfit() * inside / values as f64;
             if !ascent.climb_below(largest, FIRST) {
                 return None;
@@ -263,7 +264,7 @@ impl<'a, 'b> Begun<'a, 'b> {
 }
 
 /// Differences of the means from a response.
-pub(super) fn residual(means: &[f64], response: &[f64]) -> Vec<f64> {
+pub fn residual(means: &[f64], response: &[f64]) -> Vec<f64> {
     means.iter().zip(response).map(|(y, m)| y - m).collect()
 }
 

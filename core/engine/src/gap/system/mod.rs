@@ -32,6 +32,8 @@ pub struct System<'a> {
     /// The effects: those on the response in the order in which they act.
     pub effects: Vec<Placed<'a>>,
     priors: Vec<Distribution>,
+    /// The outputs that are needed; `None` for all.
+    needed: Option<Vec<bool>>,
 }
 
 /// The response at a point with its derivatives.
@@ -63,7 +65,7 @@ impl<'a> System<'a> {
         for effect in &effects {
             priors.extend(effect.hyperparameters().into_iter().map(|h| h.prior));
         }
-        Self { experiment, effects, priors }
+        Self { experiment, effects, priors, needed: None }
     }
 
     /// The system with one more effect.
@@ -71,6 +73,12 @@ impl<'a> System<'a> {
         let mut effects = self.effects.clone();
         effects.push(effect);
         Self::new(self.experiment, effects)
+    }
+
+    /// The same where only some outputs are needed; its responses may be any finite numbers at the others.
+    #[must_use]
+    pub fn at_outputs(&self, needed: Vec<bool>) -> Self {
+        Self { needed: Some(needed), ..self.clone() }
     }
 
     /// The number of unknowns.
@@ -107,7 +115,11 @@ impl<'a> System<'a> {
     pub fn responses<P: AsRef<[f64]>>(&self, points: &[P]) -> Vec<Vec<f64>> {
         let columns = self.input(&vec![0.0; self.dimension()]).len();
         let inputs = points.iter().map(|p| self.input(p.as_ref()));
-        let means = self.forward().mean(&Matrix::from_rows(columns, inputs));
+        let inputs = Matrix::from_rows(columns, inputs);
+        let means = match &self.needed {
+            Some(needed) => self.forward().mean_at(needed, &inputs),
+            None => self.forward().mean(&inputs),
+        };
         let with_effects = |(mean, point): (&[f64], &P)| {
             let mut response = mean.to_vec();
             let point = point.as_ref();
@@ -128,7 +140,11 @@ impl<'a> System<'a> {
             moved.extend(own.zip(effect.effect.switches()).map(|(unknown, i)| (unknown, d + i)));
         }
         let columns: Vec<usize> = moved.iter().map(|(_, column)| *column).collect();
-        let (mean, jacobian) = self.forward().mean_and_jacobian_by(&self.input(point), &columns);
+        let input = self.input(point);
+        let (mean, jacobian) = match &self.needed {
+            Some(needed) => self.forward().mean_and_jacobian_at(needed, &input, &columns),
+            None => self.forward().mean_and_jacobian_by(&input, &columns),
+        };
         let on_top = self.on_the_response().map(|(effect, own)| (effect, &point[own]));
         let (response, rows) = with_tangents(on_top, mean, &jacobian, self.parameters(point));
         let mut unknowns: Vec<usize> = moved.iter().map(|(unknown, _)| *unknown).collect();

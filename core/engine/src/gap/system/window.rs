@@ -22,6 +22,13 @@ impl Window {
         Self { beyond: beyond.collect() }
     }
 
+    /// The system, of whose responses only the values that count are needed.
+    pub fn of_system<'a>(&self, system: &System<'a>) -> System<'a> {
+        let mut needed = system.experiment.measured();
+        self.beyond.iter().for_each(|&i| needed[i] = false);
+        system.at_outputs(needed)
+    }
+
     /// Number of values that do not count.
     pub fn beyond(&self) -> usize {
         self.beyond.len()
