@@ -19,6 +19,7 @@ mod places;
 mod refit;
 mod simpler;
 mod slots;
+mod special_case;
 mod state;
 mod subsets;
 mod support;

@@ -260,6 +260,7 @@ impl<'a> RefitSetting<'a, '_> {
             .collect();
         fits.extend(ahead.map(|fit| (first, fit)));
         fits.sort_by_key(|(i, _)| *i);
+        self.fit_special_cases(scored, systems, &mut fits);
         fits
     }
 
