@@ -17,6 +17,10 @@ const POSSIBLE: f64 = 1e-3;
 /// The smallest probability that no type is right with which that is a hypothesis.
 const DOUBT: f64 = 0.05;
 
+/// The lengths of a free form, as shares of a curve: like the types it changes a response slowly. The data decide; a short
+/// one alone expects ripples that none of the types makes, and more replicates would seem to tell much.
+const LENGTHS: [f64; 3] = [0.1, 0.3, 1.0];
+
 /// The name of the model without effects.
 const NOTHING: &str = "nothing";
 
@@ -116,7 +120,8 @@ fn free_form<'a>(
     let scale = noise_of_mean(experiment, &found.noise, response);
     let scale = scale.into_iter().map(|noise| gap * noise).collect();
     let (scale, growth) = extended(experiment, scale, &sizes(types, response));
-    let remainder = Remainder::of_scale(&whole, &scale, &system.around(&own.at).slopes);
+    let slopes = system.around(&own.at).slopes;
+    let remainder = Remainder::of_scale(&whole, &scale, &slopes, &LENGTHS);
     Possible::leaving(found, &remainder.grown(&growth), NONE, weight, system, own)
 }
 

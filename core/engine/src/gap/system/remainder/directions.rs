@@ -12,8 +12,12 @@ const TOGETHER: f64 = 0.9;
 /// The shortest length, in steps of a curve.
 const SHORTEST: f64 = 2.0;
 
-/// The interval of the cosine basis over that of a curve.
+/// The smallest interval of the basis over that of a curve, and over a length; and the number of basis functions for an
+/// interval of one length (G. Riutort-Mayol, P.-C. Bürkner, M. Andersen, A. Solin and A. Vehtari, Statistics and Computing
+/// 33 (2023) 17, equations 12 and 13).
 const WIDER: f64 = 1.2;
+const WIDER_THAN_LENGTH: f64 = 3.2;
+const WAVES: f64 = 1.75;
 
 /// The directions of the [forms](Experiment::forms) of an experiment, together of variance one in units of the noise of the
 /// mean, each with its variance.
@@ -103,15 +107,16 @@ fn waves(at: &[f64], share: f64) -> Vec<(f64, Vec<f64>)> {
     if at.len() < 4 || half <= 0.0 {
         return vec![(1.0, vec![1.0; at.len()])];
     }
-    // In units of half the curve.
+    // In units of half the curve. The interval is that of the stated length: a few points show no more of the process.
     let length = 2.0 * share.max(SHORTEST / at.len() as f64);
-    let count = (1.75 * WIDER / length).ceil() as usize + 1;
+    let wider = (WIDER_THAN_LENGTH * 2.0 * share).max(WIDER);
+    let count = (WAVES * wider / length).ceil() as usize + 1;
     let wave = |k: usize| {
-        let frequency = PI * k as f64 / (2.0 * WIDER);
+        let frequency = PI * k as f64 / (2.0 * wider);
         let power = TAU.sqrt() * length * (-0.5 * (frequency * length).powi(2)).exp();
         let value = |t: &f64| {
             let x = (t - first) / half - 1.0;
-            (frequency * (x + WIDER)).sin() / WIDER.sqrt()
+            (frequency * (x + wider)).sin() / wider.sqrt()
         };
         (power, at.iter().map(value).collect())
     };

@@ -135,12 +135,17 @@ impl Remainder {
     /// The remainder of an experiment with this noise around a response and its changes by the unknowns.
     pub fn of(experiment: &Experiment<'_>, noise: &Noise, around: &ResponseTangents) -> Self {
         let scale = noise_of_mean(experiment, noise, &around.response);
-        Self::of_scale(experiment, &scale, &around.slopes)
+        Self::of_scale(experiment, &scale, &around.slopes, &LENGTHS)
     }
 
     /// The same in these units, one a curve, in place of the noise of its mean; `slopes` are the changes of the response by
-    /// the unknowns, `unknowns x outputs`.
-    pub fn of_scale(experiment: &Experiment<'_>, scale: &[f64], slopes: &Matrix) -> Self {
+    /// the unknowns, `unknowns x outputs`, and `lengths` are those of the process, as shares of a curve.
+    pub fn of_scale(
+        experiment: &Experiment<'_>,
+        scale: &[f64],
+        slopes: &Matrix,
+        lengths: &[f64],
+    ) -> Self {
         let ordered = |mut columns: Vec<(f64, Vec<f64>)>| {
             columns.sort_by(|a, b| b.0.total_cmp(&a.0));
             columns.truncate(DIRECTIONS);
@@ -154,7 +159,7 @@ impl Remainder {
             ordered(each.collect())
         };
         let forms = (experiment.forms.rows() > 0).then(|| ordered(of_forms(experiment, scale)));
-        let (variances, factors) = LENGTHS.iter().map(of_length).chain(forms).unzip();
+        let (variances, factors) = lengths.iter().map(of_length).chain(forms).unzip();
         Self { factors, variances }
     }
 
