@@ -115,7 +115,8 @@ pub fn table(gap: &GapFindings, proof: &NameProof, numbers: &mut Numbers) -> Mar
             rival(gap)
         ),
         "standard errors pair the replicates, or the parts.",
-        "differences below 2.5 standard errors: then the name is not proven.",
+        "differences below 2.5 standard errors: then the name is not proven, unless each of at least four parts of a record \
+         without replicates favours the effect by more than 20 to 1.",
     );
     numbers.table(&table, &caption)
 }

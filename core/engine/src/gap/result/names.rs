@@ -37,8 +37,8 @@ pub struct RivalComparison {
     pub effect: String,
     /// The log predictive density with the effect less that with its rival, summed over the parts, and its error.
     pub score: CrossValidation,
-    /// True when the effect predicts better, by 2.5 standard errors; replicates beside other kinds only must not contradict
-    /// it by as much.
+    /// True when the effect [is proven](CrossValidation::is_proven) to predict better; replicates beside other kinds only
+    /// must not contradict it by 2.5 standard errors.
     pub passed: bool,
 }
 
@@ -78,8 +78,7 @@ impl NameProof {
 
 /// True when an effect predicts left-out data better than its rival; data that do not decide only must not contradict it.
 fn passed(score: &CrossValidation, all: &[CrossValidation]) -> bool {
-    let errors = if decides(score, all) { PROVEN } else { -PROVEN };
-    score.difference > errors * score.error.unwrap_or(0.0)
+    if decides(score, all) { score.is_proven() } else { score.is_better(-PROVEN) }
 }
 
 /// The reason, in words, for which held-out data contradict effects: the gap grew, or the interval of the share that

@@ -23,6 +23,13 @@ use crate::gap::system::fit::Fit;
 /// (1995) 773).
 pub(super) const STRONG: f64 = 3.0;
 
+/// The number of standard errors by which an explanation has to predict left-out data better than its rival.
+pub const PROVEN: f64 = 2.5;
+
+/// The number of parts that all have to favour an explanation where their differences are not of one size: of two equal ones
+/// so many parts favour the first with the probability 1/16, and by [`PROVEN`] standard errors with 0.04.
+const UNANIMOUS: usize = 4;
+
 /// A kind of part that is left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -86,10 +93,27 @@ pub struct CrossValidation {
     pub by_replicates: bool,
     /// The standard error from the variance between the parts; `None` below three.
     pub scatter: Option<f64>,
+    /// The number of parts that favour the first by more than 20 to 1.
+    pub in_favour: usize,
     /// The number of parts that favour the second by more than 20 to 1.
     pub against: usize,
     /// The p-value of the advantage if all explanations that were tried were equal; `None` without a standard error.
     pub p: Option<f64>,
+}
+
+impl CrossValidation {
+    /// True when the first predicts better by 2.5 standard errors; or, where the parts themselves give the error, when each
+    /// of at least four favours it by more than 20 to 1. The parts of one record may show a law by amounts of several orders
+    /// of magnitude, whose standard error is about their sum though none of them contradicts it.
+    pub fn is_proven(&self) -> bool {
+        let all_favour = self.in_favour == self.parts && self.parts >= UNANIMOUS;
+        self.is_better(PROVEN) || !self.by_replicates && all_favour
+    }
+
+    /// True when the first predicts better by so many standard errors; of a negative number, not worse by as many.
+    pub fn is_better(&self, errors: f64) -> bool {
+        self.difference > errors * self.error.unwrap_or(0.0)
+    }
 }
 
 /// Compares two explanations by cross-validation; the first is the best of `tried`.
@@ -159,6 +183,7 @@ fn summary(
         error: found.map(|((error, _), _)| error),
         by_replicates: found.is_some_and(|(_, by_replicates)| by_replicates),
         scatter: of_parts.map(|(error, _)| error),
+        in_favour: all.iter().filter(|told| told.difference > STRONG).count(),
         against: all.iter().filter(|told| told.difference < -STRONG).count(),
         p,
     }
@@ -221,4 +246,44 @@ fn of_parts(all: &[FoldScore]) -> Option<(f64, f64)> {
 fn squares(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     values.iter().map(|x| (x - mean).powi(2)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use lacuna::math::random::Stream;
+
+    use super::*;
+    use crate::gap::testing::SyntheticExperiment;
+
+    /// The comparison of parts of these differences, each favouring the first by so much also without one of its replicates.
+    fn told(differences: &[f64], replicates: usize) -> CrossValidation {
+        let world = SyntheticExperiment::new(&["c"], &["s"], 8, 0.0, &["level"], |_, _, _, _| 1.0);
+        let experiment = world.experiment(&[0.0; 8], replicates, &Stream::root(1));
+        let part = |difference: &f64| FoldScore {
+            difference: *difference,
+            replicate: None,
+            without: vec![(0..replicates).map(|r| difference * r as f64).collect()],
+        };
+        let all: Vec<FoldScore> = differences.iter().map(part).collect();
+        summary(&experiment, LeftOut::Block, &all, 1)
+    }
+
+    /// The standard error of a sum of which one part is nearly all is the sum, whatever the other parts say.
+    #[test]
+    fn parts_of_several_orders_of_magnitude_are_a_proof_if_none_is_missing() {
+        let growing = told(&[12.0, 300.0, 9e3, 6e5], 1);
+        assert!(!growing.is_better(PROVEN) && growing.is_proven(), "{growing:?}");
+        for (case, differences) in [
+            ("one against", &[-12.0, 300.0, 9e3, 6e5][..]),
+            ("one undecided", &[1.0, 300.0, 9e3, 6e5]),
+            ("three", &[300.0, 9e3, 6e5]),
+        ] {
+            assert!(!told(differences, 1).is_proven(), "{case}");
+        }
+        let even = told(&[12.0, 14.0, 11.0, 1.0], 1);
+        assert!(even.is_better(PROVEN) && even.is_proven(), "{even:?}");
+        // Replicates tell the error of the sum.
+        let paired = told(&[12.0, 300.0, 9e3, 6e5], 2);
+        assert!(paired.by_replicates && !paired.is_proven(), "{paired:?}");
+    }
 }

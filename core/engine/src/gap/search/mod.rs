@@ -29,7 +29,7 @@ mod verdict;
 mod visited;
 
 pub use checks::{consistency, stability};
-pub use cross_validate::{CrossValidation, Explanation, LeftOut, cross_validate};
+pub use cross_validate::{CrossValidation, Explanation, LeftOut, PROVEN, cross_validate};
 pub use diagnostics::{Detectability, Diagnostics, SearchOptions, SearchResult, SearchStep};
 pub use discriminate::{DiscriminatingData, Discrimination, FurtherData, discriminate};
 pub use evidence::{LogEvidence, log_evidence};
@@ -40,7 +40,7 @@ pub use refit::{RefitSetting, Scored, Weighed, most_promising, refit_all};
 pub use state::kinds;
 pub use support::{Support, decides};
 pub use verdict::{
-    Bin, Brier, CEILING, MissingEffect, PROVEN, Reliability, SURE, Told, Traits, Verdict,
-    VerdictKind, class, explains, verdict,
+    Bin, Brier, CEILING, MissingEffect, Reliability, SURE, Told, Traits, Verdict, VerdictKind,
+    class, explains, verdict,
 };
 pub use visited::{Inclusion, ModelAverage, VisitedModel};

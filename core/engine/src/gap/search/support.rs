@@ -34,12 +34,25 @@ pub struct Support {
 }
 
 impl Support {
-    /// True when it predicts each deciding kind of left-out data better than the free form, by this number of standard
-    /// errors; of a negative number, each kind. Without data that could be left out nothing contradicts it.
-    pub fn transfers(&self, errors: f64) -> bool {
+    /// True when it [is proven](CrossValidation::is_proven) to predict each deciding kind of left-out data better than the
+    /// free form. Without data that could be left out nothing contradicts it.
+    pub fn is_proven(&self) -> bool {
+        self.deciding().all(CrossValidation::is_proven)
+    }
+
+    /// True when it predicts each deciding kind better by so many standard errors.
+    pub fn is_better(&self, errors: f64) -> bool {
+        self.deciding().all(|one| one.is_better(errors))
+    }
+
+    /// True when the free form predicts some kind better by so many standard errors.
+    pub fn is_contradicted(&self, errors: f64) -> bool {
+        !self.against_free_form.iter().all(|one| one.is_better(-errors))
+    }
+
+    fn deciding(&self) -> impl Iterator<Item = &CrossValidation> {
         let all = &self.against_free_form;
-        let better = |one: &CrossValidation| one.difference > errors * one.error.unwrap_or(0.0);
-        all.iter().filter(|one| errors <= 0.0 || decides(one, all)).all(better)
+        all.iter().filter(|one| decides(one, all))
     }
 
     /// True when it foretells the blocks together better than the free form, by 20 to 1, and none of them worse by as

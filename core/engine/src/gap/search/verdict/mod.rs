@@ -54,14 +54,12 @@ const SIGNIFICANT: f64 = 3.0;
 /// The smallest probability at which a type or class is named: a name that is more often wrong than right is none.
 const LIKELY: f64 = 0.5;
 
-/// The number of standard errors by which an effect has to predict left-out data better than a free form in its place.
-pub const PROVEN: f64 = 2.5;
-
 /// The number of standard errors by which a free form in the place of an effect has to predict left-out data better to
 /// contradict it.
 const CONTRADICTED: f64 = 2.0;
 
-/// The number of [`PROVEN`] for an effect beside which another part of the gap has no name.
+/// The number of standard errors by which an effect beside which another part of the gap has no name has to predict left-out
+/// data better than a free form in its place.
 const CERTAIN: f64 = 4.0;
 
 /// The 95 % quantile of the normal distribution: an excess of so many standard deviations is clear.
@@ -298,7 +296,7 @@ fn named(found: &SearchResult<'_>, candidates: &[Candidate]) -> Vec<MissingEffec
         let shares = if alike.is_empty() { types } else { &alike };
         let share = shares.iter().find(|(name, _)| name == kind).map_or(0.0, |(_, p)| *p);
         let class = class(kind, share, shares);
-        let supported = support.local >= HALF && support.transfers(PROVEN);
+        let supported = support.local >= HALF && support.is_proven();
         let traits = Traits::of(found, support, &class, types);
         all.push(MissingEffect {
             name: effect.name.clone(),
@@ -311,8 +309,8 @@ fn named(found: &SearchResult<'_>, candidates: &[Candidate]) -> Vec<MissingEffec
             traits: Some(traits),
             share: support.share,
             supported,
-            contradicted: !support.transfers(-CONTRADICTED),
-            certain: class.len() == 1 && supported && support.transfers(CERTAIN),
+            contradicted: support.is_contradicted(CONTRADICTED),
+            certain: class.len() == 1 && supported && support.is_better(CERTAIN),
             class,
         });
         begin = end;
