@@ -91,7 +91,7 @@ impl Stage {
             Self::Quantities => (6, "quantities", OnVersion(3)),
             Self::Reliability => (6, "reliability", OnVersion(3)),
             Self::Assess => (6, "assess", OnVersion(8)),
-            Self::Gap => (7, "gap", OnVersion(6)),
+            Self::Gap => (7, "gap", OnVersion(7)),
             Self::Show => (7, "show", OnVersion(1)),
             Self::Power => (7, "power", OnVersion(2)),
             Self::Coverage => (7, "coverage", OnVersion(3)),
