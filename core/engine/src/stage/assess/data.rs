@@ -1,5 +1,7 @@
 //! Checks of the measurements, alone and against the runs.
 
+use std::borrow::Cow;
+
 use lacuna::data::layout::Group;
 use lacuna::data::{Measurements, Observations};
 use lacuna_linalg::Matrix;
@@ -59,14 +61,14 @@ fn dropped(measured: &Measured) -> Option<Finding> {
 
 fn beside_runs(study: &Study, problem: &InverseProblem<'_>, data: &Observations) -> Vec<Finding> {
     let responses = match &problem.data.value.ensemble {
-        Some(ensemble) => ensemble.responses.clone(),
-        None => at_prior(study, problem),
+        Some(ensemble) => Cow::Borrowed(&ensemble.responses),
+        None => Cow::Owned(at_prior(study, problem)),
     };
     let answered: Vec<usize> =
         (0..responses.rows()).filter(|&i| responses.row(i).iter().all(|y| y.is_finite())).collect();
     let mut found = Vec::new();
     found.extend(unanswered(responses.rows() - answered.len(), responses.rows()));
-    let responses = responses.select_rows(&answered);
+    let answers = || answered.iter().map(|&i| responses.row(i));
     let groups = study.layouts.groups();
     let short = groups.iter().all(|group| group.indices.len() < SHORT);
     let curves: Vec<(String, Vec<usize>)> = if short {
@@ -83,7 +85,7 @@ fn beside_runs(study: &Study, problem: &InverseProblem<'_>, data: &Observations)
             s.sd().map_or(0.0, |sd| sd / (s.count as f64).sqrt())
         };
         let range = |&i: &usize| {
-            let column = responses.iter_rows().map(|row| row[i]);
+            let column = answers().map(|row| row[i]);
             column.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)))
         };
         let size = |row: &[f64]| {
@@ -94,7 +96,7 @@ fn beside_runs(study: &Study, problem: &InverseProblem<'_>, data: &Observations)
             name,
             data: measured.iter().map(|&i| (summaries[i].mean, error(i))).collect(),
             runs: measured.iter().map(range).collect(),
-            sizes: responses.iter_rows().map(size).collect(),
+            sizes: answers().map(size).collect(),
         })
     }));
     found
