@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Wanted;
 use lacuna_engine::stage::direct::ModelMap;
 use lacuna_engine::study::resolve::load_text;
 use lacuna_linalg::Matrix;
@@ -134,7 +135,8 @@ fn equations_are_integrated_as_far_as_is_needed() {
     needed[12] = true;
     let rate = 0.7;
     let mean = map.mean_at(&needed, &Matrix::from_vec(1, 1, vec![rate]));
-    let (also, slopes) = map.mean_and_jacobian_at(&needed, &[rate], &[0]);
+    let wanted = Wanted { parameters: &[0], outputs: Some(&needed) };
+    let (also, slopes) = map.mean_and_jacobian_by(&[rate], wanted);
     for i in 0..20 {
         let (k, t) = (if i < 10 { 2.0 } else { 1.0 }, 0.5 * (1 + i % 10) as f64);
         let until = t.min(1.5);

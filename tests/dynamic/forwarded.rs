@@ -4,6 +4,7 @@ use lacuna::data::{Axis, Layout, Layouts, Measurements, Parameter, Replicate, Sc
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Known};
+use lacuna::plugin::forward::Wanted;
 use lacuna::plugin::model::Call;
 use lacuna::plugin::reader::MeasurementSource;
 use lacuna::plugin::registry::{self, Built, Kind};
@@ -317,10 +318,10 @@ fn a_response_with_its_derivatives_is_the_same() {
 fn said(emulator: &dyn Emulator) -> Vec<u64> {
     let point = [0.3, 1.2];
     let (mean, jacobian) = emulator.mean_and_jacobian(&point);
-    let (again, some) = emulator.mean_and_jacobian_by(&point, &[1]);
+    let (again, some) = emulator.mean_and_jacobian_by(&point, Wanted::by(&[1]));
     assert_eq!((mean.len(), jacobian.columns(), some.columns()), (3, 2, 1));
     assert_eq!((&again, some), (&mean, jacobian.select_columns(&[1])));
-    assert_eq!(emulator.mean_and_jacobian_by(&point, &[]).1.columns(), 0);
+    assert_eq!(emulator.mean_and_jacobian_by(&point, Wanted::by(&[])).1.columns(), 0);
     assert_eq!(emulator.failure(), None);
     bits(&[mean, jacobian.into_vec(), emulator.jacobian(&point).into_vec()].concat())
 }

@@ -6,6 +6,7 @@ use lacuna::data::{Axis, Layout, Parameter, Scenario, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::Known;
+use lacuna::plugin::forward::Wanted;
 use lacuna::plugin::model::Call;
 use lacuna::plugin::reader::MeasurementSource;
 use lacuna::plugin::registry::Built;
@@ -222,8 +223,10 @@ fn means_with_derivatives_are_checked() {
     ] {
         let (surrogate, _folder) = misbehaving::<dyn Surrogate>(name, define);
         let emulator = fitted(&*surrogate).unwrap();
-        let (both, some) =
-            (emulator.mean_and_jacobian(&[0.5]), emulator.mean_and_jacobian_by(&[0.5], &[0]));
+        let (both, some) = (
+            emulator.mean_and_jacobian(&[0.5]),
+            emulator.mean_and_jacobian_by(&[0.5], Wanted::by(&[0])),
+        );
         if let Some(expected) = expected {
             let said = emulator.failure().unwrap();
             assert!(said.contains(expected) && said.contains(&format!("lib{name}.so")), "{said}");

@@ -181,7 +181,7 @@ impl ServeEmulator for Owned {
             if let Some(odd) = parameters.iter().find(|&&i| i >= emulator.dimension()) {
                 return Err(Refusal::stop(format!("was asked for the parameter number {odd}")));
             }
-            emulator.mean_and_jacobian_by(&point, parameters)
+            emulator.mean_and_jacobian_by(&point, forward::Wanted::by(parameters))
         };
         // SAFETY: the buffers hold `outputs` and `outputs x count` numbers.
         unsafe {

@@ -29,26 +29,15 @@ pub trait Forward: Send + Sync {
         (mean.into_vec(), self.jacobian(point))
     }
 
-    /// Like [`Forward::mean_and_jacobian`], but with the derivatives by these parameters only, in this order.
-    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+    /// Like [`Forward::mean_and_jacobian`], but with the wanted derivatives only.
+    fn mean_and_jacobian_by(&self, point: &[f64], wanted: Wanted<'_>) -> (Vec<f64>, Matrix) {
         let (mean, jacobian) = self.mean_and_jacobian(point);
-        (mean, jacobian.select_columns(parameters))
+        (mean, jacobian.select_columns(wanted.parameters))
     }
 
     /// Like [`Forward::mean`], where only some of the outputs are needed; the others may be any finite numbers.
     fn mean_at(&self, _needed: &[bool], points: &Matrix) -> Matrix {
         self.mean(points)
-    }
-
-    /// Like [`Forward::mean_and_jacobian_by`], where only some of the outputs are needed; the others may be any finite
-    /// numbers.
-    fn mean_and_jacobian_at(
-        &self,
-        _needed: &[bool],
-        point: &[f64],
-        parameters: &[usize],
-    ) -> (Vec<f64>, Matrix) {
-        self.mean_and_jacobian_by(point, parameters)
     }
 
     /// Returns true if the response of the same point is another one with other random numbers.
@@ -73,6 +62,22 @@ pub trait Forward: Send + Sync {
     /// Reason why the map can no longer answer; `None` while it works.
     fn failure(&self) -> Option<String> {
         None
+    }
+}
+
+/// Derivatives that are wanted of a map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wanted<'a> {
+    /// Parameters by which the derivatives are wanted, in this order.
+    pub parameters: &'a [usize],
+    /// True for each output that is needed, as in [`Forward::mean_at`]; `None` for all.
+    pub outputs: Option<&'a [bool]>,
+}
+
+impl<'a> Wanted<'a> {
+    /// The derivatives of all outputs by these parameters.
+    pub fn by(parameters: &'a [usize]) -> Self {
+        Self { parameters, outputs: None }
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use lacuna::math::random::Stream;
 use lacuna::plugin::Fact;
-use lacuna::plugin::forward::{Forward, Linear};
+use lacuna::plugin::forward::{Forward, Linear, Wanted};
 use lacuna::plugin::surrogate::{Emulator, FitError, Sensitivity, Summand, Surrogate, Training};
 use lacuna::run::{Fault, Progress, Stop};
 use lacuna_abi::check::{finite_only, numbers_only, shaped};
@@ -256,7 +256,8 @@ impl Forward for LoadedEmulator {
         })
     }
 
-    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+    fn mean_and_jacobian_by(&self, point: &[f64], wanted: Wanted<'_>) -> (Vec<f64>, Matrix) {
+        let parameters = wanted.parameters;
         self.object.or_fault(self.both(point, Some(parameters)), || None).unwrap_or_else(|| {
             let (mean, jacobian) = self.mean_and_jacobian(point);
             (mean, jacobian.select_columns(parameters))

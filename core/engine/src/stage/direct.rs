@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Forward;
-use lacuna::plugin::forward::Numbers;
+use lacuna::plugin::forward::{Numbers, Wanted};
 use lacuna::plugin::model::{Call, EvalError, Gradient, Response};
 use lacuna::run::{Observer, Stop, files};
 use lacuna_linalg::Matrix;
@@ -339,30 +339,19 @@ impl Forward for ModelMap<'_> {
         (mean, jacobian)
     }
 
-    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
-        if self.simulator.model.gradient().is_none() {
-            return self.differences(point, parameters);
-        }
-        let (mean, jacobian) = self.mean_and_jacobian(point);
-        (mean, jacobian.select_columns(parameters))
+    fn mean_and_jacobian_by(&self, point: &[f64], wanted: Wanted<'_>) -> (Vec<f64>, Matrix) {
+        let Some(gradient) = self.simulator.model.gradient() else {
+            return self.differences(point, wanted.parameters);
+        };
+        let beginnings = wanted
+            .outputs
+            .and_then(|needed| self.derivatives_of_beginnings(needed, gradient, point));
+        let (mean, jacobian) = beginnings.unwrap_or_else(|| self.mean_and_jacobian(point));
+        (mean, jacobian.select_columns(wanted.parameters))
     }
 
     fn mean_at(&self, needed: &[bool], points: &Matrix) -> Matrix {
         self.mean_of_beginnings(needed, points).unwrap_or_else(|| self.mean(points))
-    }
-
-    fn mean_and_jacobian_at(
-        &self,
-        needed: &[bool],
-        point: &[f64],
-        parameters: &[usize],
-    ) -> (Vec<f64>, Matrix) {
-        let gradient = self.simulator.model.gradient();
-        let both = gradient.and_then(|own| self.derivatives_of_beginnings(needed, own, point));
-        match both {
-            Some((mean, jacobian)) => (mean, jacobian.select_columns(parameters)),
-            None => self.mean_and_jacobian_by(point, parameters),
-        }
     }
 
     fn failure(&self) -> Option<String> {

@@ -8,6 +8,7 @@ use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Forward;
 use lacuna::plugin::discrepancy::CommonError;
 use lacuna::plugin::effect::Placed;
+use lacuna::plugin::forward::Wanted;
 use lacuna_linalg::Matrix;
 
 use super::with_effects::WithEffects;
@@ -81,26 +82,16 @@ impl Forward for Reordered<'_> {
 
     fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
         let all: Vec<usize> = (0..point.len()).collect();
-        self.mean_and_jacobian_by(point, &all)
+        self.mean_and_jacobian_by(point, Wanted::by(&all))
     }
 
     fn mean_at(&self, needed: &[bool], points: &Matrix) -> Matrix {
         self.forward.mean_at(needed, &points.select_columns(&self.order()))
     }
 
-    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
-        let (point, parameters) = self.inner(point, parameters);
-        self.forward.mean_and_jacobian_by(&point, &parameters)
-    }
-
-    fn mean_and_jacobian_at(
-        &self,
-        needed: &[bool],
-        point: &[f64],
-        parameters: &[usize],
-    ) -> (Vec<f64>, Matrix) {
-        let (point, parameters) = self.inner(point, parameters);
-        self.forward.mean_and_jacobian_at(needed, &point, &parameters)
+    fn mean_and_jacobian_by(&self, point: &[f64], wanted: Wanted<'_>) -> (Vec<f64>, Matrix) {
+        let (point, parameters) = self.inner(point, wanted.parameters);
+        self.forward.mean_and_jacobian_by(&point, Wanted { parameters: &parameters, ..wanted })
     }
 
     fn failure(&self) -> Option<String> {

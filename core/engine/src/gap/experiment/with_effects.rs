@@ -3,6 +3,7 @@
 use lacuna::data::Parameter;
 use lacuna::plugin::Forward;
 use lacuna::plugin::effect::{Placed, with_tangents};
+use lacuna::plugin::forward::Wanted;
 use lacuna_linalg::Matrix;
 
 /// A forward map whose parameters are those of another one, followed by the unknowns of effects on its response.
@@ -56,31 +57,6 @@ impl<'a> WithEffects<'a> {
         }
         means
     }
-
-    /// Those of these parameters that are the inner map's.
-    fn own_of(&self, parameters: &[usize]) -> Vec<usize> {
-        parameters.iter().copied().filter(|&i| i < self.forward.dimension()).collect()
-    }
-
-    /// The response of the inner map and its derivatives by its own among these parameters, with the effects, and by all of
-    /// these parameters.
-    fn on_top(
-        &self,
-        (mean, jacobian): (Vec<f64>, Matrix),
-        point: &[f64],
-        parameters: &[usize],
-    ) -> (Vec<f64>, Matrix) {
-        let (d, own) = (self.forward.dimension(), jacobian.columns());
-        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian, &point[..d]);
-        // The derivatives by all unknowns of the effects come after those that were asked for.
-        let mut seen = 0;
-        let column = |&i: &usize| {
-            seen += usize::from(i < d);
-            if i < d { seen - 1 } else { own + i - d }
-        };
-        let columns: Vec<usize> = parameters.iter().map(column).collect();
-        (response, tangents.transposed().select_columns(&columns))
-    }
 }
 
 impl Forward for WithEffects<'_> {
@@ -111,21 +87,21 @@ impl Forward for WithEffects<'_> {
         (response, tangents.transposed())
     }
 
-    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
-        let own = self.own_of(parameters);
-        let inner = self.forward.mean_and_jacobian_by(&point[..self.forward.dimension()], &own);
-        self.on_top(inner, point, parameters)
-    }
-
-    fn mean_and_jacobian_at(
-        &self,
-        needed: &[bool],
-        point: &[f64],
-        parameters: &[usize],
-    ) -> (Vec<f64>, Matrix) {
-        let (d, own) = (self.forward.dimension(), self.own_of(parameters));
-        let inner = self.forward.mean_and_jacobian_at(needed, &point[..d], &own);
-        self.on_top(inner, point, parameters)
+    fn mean_and_jacobian_by(&self, point: &[f64], wanted: Wanted<'_>) -> (Vec<f64>, Matrix) {
+        let d = self.forward.dimension();
+        let parameters = wanted.parameters;
+        let own: Vec<usize> = parameters.iter().copied().filter(|&i| i < d).collect();
+        let inner = Wanted { parameters: &own, ..wanted };
+        let (mean, jacobian) = self.forward.mean_and_jacobian_by(&point[..d], inner);
+        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian, &point[..d]);
+        // The derivatives by all unknowns of the effects come after those that were asked for.
+        let mut seen = 0;
+        let column = |&i: &usize| {
+            seen += usize::from(i < d);
+            if i < d { seen - 1 } else { own.len() + i - d }
+        };
+        let columns: Vec<usize> = parameters.iter().map(column).collect();
+        (response, tangents.transposed().select_columns(&columns))
     }
 
     fn failure(&self) -> Option<String> {

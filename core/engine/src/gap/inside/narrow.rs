@@ -2,6 +2,7 @@
 //! only, so that its cost does not grow with the number of candidates.
 
 use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Wanted;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
@@ -88,21 +89,6 @@ impl<'a> RestrictedMap<'a> {
         }
         all
     }
-
-    /// The model with the pieces of a point and of these parameters, with its own point and their columns in it.
-    fn of_part(
-        &self,
-        point: &[f64],
-        parameters: &[usize],
-    ) -> (&ModelMap<'a>, Vec<f64>, Vec<usize>) {
-        let d = self.study.parameters.len();
-        let (part, inputs) = self.part(&self.present(point, parameters));
-        let column = |&i: &usize| match i.checked_sub(d) {
-            Some(input) => inputs.iter().position(|own| *own == input).map_or(0, |k| d + k),
-            None => i,
-        };
-        (part, self.narrowed(point, inputs), parameters.iter().map(column).collect())
-    }
 }
 
 fn direct<'a>(
@@ -139,22 +125,19 @@ impl Forward for RestrictedMap<'_> {
 
     fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
         let all: Vec<usize> = (0..point.len()).collect();
-        self.mean_and_jacobian_by(point, &all)
+        self.mean_and_jacobian_by(point, Wanted::by(&all))
     }
 
-    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
-        let (part, point, columns) = self.of_part(point, parameters);
-        part.mean_and_jacobian_by(&point, &columns)
-    }
-
-    fn mean_and_jacobian_at(
-        &self,
-        needed: &[bool],
-        point: &[f64],
-        parameters: &[usize],
-    ) -> (Vec<f64>, Matrix) {
-        let (part, point, columns) = self.of_part(point, parameters);
-        part.mean_and_jacobian_at(needed, &point, &columns)
+    fn mean_and_jacobian_by(&self, point: &[f64], wanted: Wanted<'_>) -> (Vec<f64>, Matrix) {
+        let d = self.study.parameters.len();
+        let (part, inputs) = self.part(&self.present(point, wanted.parameters));
+        let column = |&i: &usize| match i.checked_sub(d) {
+            Some(input) => inputs.iter().position(|own| *own == input).map_or(0, |k| d + k),
+            None => i,
+        };
+        let columns: Vec<usize> = wanted.parameters.iter().map(column).collect();
+        let wanted = Wanted { parameters: &columns, ..wanted };
+        part.mean_and_jacobian_by(&self.narrowed(point, inputs), wanted)
     }
 
     fn failure(&self) -> Option<String> {

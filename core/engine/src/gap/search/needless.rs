@@ -7,6 +7,7 @@
 use lacuna::data::Parameter;
 use lacuna::math::random::Stream;
 use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Wanted;
 use lacuna_linalg::Matrix;
 use serde::{Deserialize, Serialize};
 
@@ -115,6 +116,12 @@ impl Held<'_> {
         let is_free = |i: &usize| !self.held.iter().any(|(held, _)| held == i);
         (0..self.forward.dimension()).filter(is_free).collect()
     }
+
+    /// The points of the inner map, one a row.
+    fn whole_rows(&self, points: &Matrix) -> Matrix {
+        let rows = points.iter_rows().map(|own| self.whole(own));
+        Matrix::from_rows(self.forward.dimension(), rows)
+    }
 }
 
 impl Forward for Held<'_> {
@@ -127,8 +134,11 @@ impl Forward for Held<'_> {
     }
 
     fn mean(&self, points: &Matrix) -> Matrix {
-        let rows = points.iter_rows().map(|own| self.whole(own));
-        self.forward.mean(&Matrix::from_rows(self.forward.dimension(), rows))
+        self.forward.mean(&self.whole_rows(points))
+    }
+
+    fn mean_at(&self, needed: &[bool], points: &Matrix) -> Matrix {
+        self.forward.mean_at(needed, &self.whole_rows(points))
     }
 
     fn jacobian(&self, point: &[f64]) -> Matrix {
@@ -136,13 +146,14 @@ impl Forward for Held<'_> {
     }
 
     fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
-        self.forward.mean_and_jacobian_by(&self.whole(point), &self.free())
+        self.forward.mean_and_jacobian_by(&self.whole(point), Wanted::by(&self.free()))
     }
 
-    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+    fn mean_and_jacobian_by(&self, point: &[f64], wanted: Wanted<'_>) -> (Vec<f64>, Matrix) {
         let free = self.free();
-        let columns: Vec<usize> = parameters.iter().map(|&i| free[i]).collect();
-        self.forward.mean_and_jacobian_by(&self.whole(point), &columns)
+        let columns: Vec<usize> = wanted.parameters.iter().map(|&i| free[i]).collect();
+        let wanted = Wanted { parameters: &columns, ..wanted };
+        self.forward.mean_and_jacobian_by(&self.whole(point), wanted)
     }
 
     fn failure(&self) -> Option<String> {

@@ -1,7 +1,7 @@
 //! Forward maps that count their evaluations: the progress of a search, whose end is not known beforehand.
 
 use lacuna::plugin::Forward;
-use lacuna::plugin::forward::Linear;
+use lacuna::plugin::forward::{Linear, Wanted};
 use lacuna::run::Progress;
 use lacuna_linalg::Matrix;
 
@@ -53,24 +53,14 @@ impl<F: std::ops::Deref<Target: Forward> + Send + Sync> Forward for Counted<'_, 
         self.forward.mean_and_jacobian(point)
     }
 
-    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+    fn mean_and_jacobian_by(&self, point: &[f64], wanted: Wanted<'_>) -> (Vec<f64>, Matrix) {
         self.progress.add(1);
-        self.forward.mean_and_jacobian_by(point, parameters)
+        self.forward.mean_and_jacobian_by(point, wanted)
     }
 
     fn mean_at(&self, needed: &[bool], points: &Matrix) -> Matrix {
         self.progress.add(points.rows() as u64);
         self.forward.mean_at(needed, points)
-    }
-
-    fn mean_and_jacobian_at(
-        &self,
-        needed: &[bool],
-        point: &[f64],
-        parameters: &[usize],
-    ) -> (Vec<f64>, Matrix) {
-        self.progress.add(1);
-        self.forward.mean_and_jacobian_at(needed, point, parameters)
     }
 
     fn linear(&self) -> Option<&dyn Linear> {

@@ -16,6 +16,7 @@ use std::ops::Range;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Forward;
 use lacuna::plugin::effect::{Placed, with_tangents};
+use lacuna::plugin::forward::Wanted;
 use lacuna_linalg::Matrix;
 
 use self::fit::precision;
@@ -141,10 +142,8 @@ impl<'a> System<'a> {
         }
         let columns: Vec<usize> = moved.iter().map(|(_, column)| *column).collect();
         let input = self.input(point);
-        let (mean, jacobian) = match &self.needed {
-            Some(needed) => self.forward().mean_and_jacobian_at(needed, &input, &columns),
-            None => self.forward().mean_and_jacobian_by(&input, &columns),
-        };
+        let wanted = Wanted { parameters: &columns, outputs: self.needed.as_deref() };
+        let (mean, jacobian) = self.forward().mean_and_jacobian_by(&input, wanted);
         let on_top = self.on_the_response().map(|(effect, own)| (effect, &point[own]));
         let (response, rows) = with_tangents(on_top, mean, &jacobian, self.parameters(point));
         let mut unknowns: Vec<usize> = moved.iter().map(|(unknown, _)| *unknown).collect();

@@ -1,11 +1,12 @@
 //! The first part of each curve: equations that are integrated along the last axis end where nothing more is needed.
 
 use lacuna::data::{Axis, Coordinates, Layout};
-use lacuna::plugin::model::Gradient;
+use lacuna::plugin::model::{Gradient, Response};
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
 use super::ModelMap;
+use crate::stage::simulator::Setting;
 
 /// The first places of each curve of a layout.
 struct Beginning {
@@ -65,7 +66,7 @@ impl ModelMap<'_> {
         Some(Matrix::from_rows(self.outputs, rows))
     }
 
-    /// [`Forward::mean_and_jacobian_at`](lacuna::plugin::Forward::mean_and_jacobian_at) of equations, by all parameters;
+    /// [`Forward::mean_and_jacobian_by`](lacuna::plugin::Forward::mean_and_jacobian_by) of equations, by all parameters;
     /// beyond the beginnings the derivatives are zero.
     pub(super) fn derivatives_of_beginnings(
         &self,
@@ -76,10 +77,15 @@ impl ModelMap<'_> {
         let beginnings = self.beginnings(needed)?;
         let mut mean = vec![f64::NAN; self.outputs];
         let mut jacobian = Matrix::zeros(self.outputs, point.len());
-        for (setting, beginning) in self.simulator.settings.iter().zip(&beginnings) {
+        let settings = &self.simulator.settings;
+        let answered = |(setting, beginning): (&Setting<'_>, &Beginning)| {
             let layout = &beginning.layout;
-            let answer = self.simulator.with_derivatives_on(layout, setting, gradient, point);
-            let Some((answer, slopes)) = self.note(answer) else { continue };
+            self.note(self.simulator.with_derivatives_on(layout, setting, gradient, point))
+        };
+        let answers: Vec<Option<(Response, Matrix)>> =
+            settings.par_iter().zip(&beginnings).map(answered).collect();
+        for ((setting, beginning), answer) in settings.iter().zip(&beginnings).zip(answers) {
+            let Some((answer, slopes)) = answer else { continue };
             for (i, row) in setting.outputs.clone().zip(beginning.rows(setting.outputs.len())) {
                 mean[i] = answer.values[row];
                 if (i - setting.outputs.start) % beginning.whole < beginning.places {

@@ -8,6 +8,7 @@ use lacuna::data::Ensemble;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Wanted;
 use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, gram, multiply_vector};
 
@@ -168,7 +169,8 @@ impl Identification<'_, '_> {
         let points = super::gate::points(self.ensemble, self.runs, constants);
         let (mut rows, mut residual) = (vec![Vec::new(); constants.len()], Vec::new());
         for (k, &r) in self.runs.iter().enumerate() {
-            let (answer, jacobian) = self.map.mean_and_jacobian_by(points.row(k), &columns);
+            let (answer, jacobian) =
+                self.map.mean_and_jacobian_by(points.row(k), Wanted::by(&columns));
             let run = self.ensemble.responses.row(r);
             residual.extend(run.iter().zip(&answer).map(|(y, c)| (y - c) / self.sd));
             for (j, row) in rows.iter_mut().enumerate() {
