@@ -109,6 +109,7 @@ fn every_finding_is_provoked_by_a_study() {
         "hierarchy/trained.rs",
         "intervals.rs",
         "stochastic.rs",
+        "gap/workflow.rs",
     ];
     let here = ["assess/data.rs", "assess/draws.rs", "assess/runs.rs"];
     let read = |file: &&str| fs::read_to_string(quick::root().join("tests").join(file)).unwrap();

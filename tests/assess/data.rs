@@ -47,6 +47,23 @@ fn a_model_that_lacks_something_is_not_trusted() {
     assert!(assessment.of_code("predictive_check").count() > 0, "{:#?}", assessment.findings);
 }
 
+/// The same oscillation in a single record: no replicates show the noise, but the data sheet of the instrument does. The noise of
+/// the measurements has a standard deviation of 0.019 mm.
+#[test]
+fn a_model_that_lacks_something_is_told_by_the_noise_that_is_stated() {
+    let folder = quick::tables();
+    let path = folder.path().join("measured.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    let first = |(i, line): &(usize, &str)| *i == 0 || line.starts_with("1,");
+    let one: Vec<&str> = text.lines().enumerate().filter(first).map(|(_, line)| line).collect();
+    fs::write(&path, one.join("\n") + "\n").unwrap();
+    let stated = ["measurements.noise.sd=0.019"];
+    let assessment = assess(folder.path(), &stated);
+    assert_eq!(assessment.of_code("model_form").count(), 0, "{:#?}", assessment.findings);
+    change(folder.path(), "measured.csv", "", |y, i| y + 0.25 * ((i % 20) as f64 / 3.0).sin());
+    found(&assess(folder.path(), &stated), "model_form", Severity::Failure);
+}
+
 /// The missing oscillation together with an emulator of degree two, whose error is five times the noise: the estimates
 /// allow for two and a half times as much, but the expected scatter of data does not, so the oscillation is not
 /// attributed to the emulator's error.

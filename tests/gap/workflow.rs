@@ -77,6 +77,10 @@ fn a_hidden_effect_is_found_added_and_shown_to_close_the_gap() {
     assert_eq!(told["study"].as_str().unwrap(), added.study.to_str().unwrap());
     let page = fs::read_to_string(run.root().join("report.html")).unwrap();
     assert!(page.contains("What the model misses"));
+    // The calibration without the effect is not trusted, nor shown as if it were.
+    let missing = again.assessment.of_code("missing_effect").next().unwrap();
+    assert!(missing.message.starts_with("The model misses `saturation`"), "{missing:?}");
+    assert_ne!(summary["assessment"]["level"], "trusted");
 
     let hidden = generator::case(SEED, &[(Kind::Saturation, vec![2])], 1.0, 12);
     assert_eq!(told["verdict"], "named", "{told:#}");

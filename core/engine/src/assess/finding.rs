@@ -119,6 +119,11 @@ impl Assessment {
         Self { level, findings }
     }
 
+    /// The verdict with further findings.
+    pub fn with(&self, further: impl IntoIterator<Item = Finding>) -> Self {
+        Self::of(self.findings.iter().cloned().chain(further).collect())
+    }
+
     /// Number of findings of a severity.
     pub fn count(&self, severity: Severity) -> usize {
         self.findings.iter().filter(|finding| finding.severity == severity).count()

@@ -49,7 +49,9 @@ pub fn rules() -> Vec<Rule> {
         },
         Rule {
             code: MODEL_FORM,
-            looks_at: "ratio of the standard deviations of model form and measurement".to_owned(),
+            looks_at: "ratio of the standard deviations of model form and measurement; of a discrepancy that is not divided into \
+                       these, of what exceeds the scatter of the replicates or the noise that `[measurements]` states"
+                .to_owned(),
             threshold: format!("{}: reservation; {}: failure", FORM.0, FORM.1),
             why: "the parameters compensate for missing physics in the direction that improves the fit, not in that \
                   of the truth (Brynjarsdottir and O'Hagan 2014)",

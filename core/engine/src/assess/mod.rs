@@ -14,6 +14,7 @@ mod finding;
 pub mod fit;
 pub mod influence;
 pub mod intervals;
+pub mod missing;
 pub mod modes;
 pub mod population;
 pub mod prior;

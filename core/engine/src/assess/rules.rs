@@ -2,7 +2,7 @@
 
 use super::{
     bounds, chains, conditions, correlation, emulator, envelope, estimate, fit, influence,
-    intervals, modes, population, prior, replicates, residuals, runs, suspicious,
+    intervals, missing, modes, population, prior, replicates, residuals, runs, suspicious,
 };
 
 /// A type of finding.
@@ -40,6 +40,7 @@ pub fn rules() -> Vec<Rule> {
         influence::rules(),
         conditions::rules(),
         intervals::rules(),
+        missing::rules(),
     ]
     .concat()
 }

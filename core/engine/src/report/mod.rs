@@ -5,6 +5,7 @@
 
 mod coverage;
 pub mod findings;
+mod missing;
 mod page;
 mod qualified;
 mod section;

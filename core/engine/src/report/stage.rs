@@ -21,7 +21,7 @@ use crate::report::findings::{
     FieldFindings, Findings, FittedDistribution, LeftOutFindings, MeasuredFindings, Role, RunInput,
     SurrogateFindings,
 };
-use crate::report::{page, summary};
+use crate::report::{missing, page, summary};
 use crate::screening::{Screening, screen};
 use crate::stage::artifacts::Artifacts;
 use crate::stage::calibrate::Calibrated;
@@ -101,6 +101,7 @@ fn findings(
     });
     let validation =
         all.validated.zip(measured).map(|(kept, measured)| kept.value.findings(measured));
+    let missing = results.gap.and_then(|gap| missing::finding(&gap.value, calibration.as_ref()?));
     let stage = |r: &Record| r.stage.split_once('-').map_or(&*r.stage, |s| s.1).to_owned();
     let seconds = run.records().iter().map(|r| (stage(r), r.seconds)).collect();
     let made_by = run.records().iter().map(|r| (stage(r), r.lacuna.clone())).collect();
@@ -124,7 +125,7 @@ fn findings(
             let named = results.gap.and_then(|kept| kept.value.warning()).map(str::to_owned);
             warnings(observer).into_iter().chain(named).collect()
         },
-        assessment: results.assessed.value.clone(),
+        assessment: results.assessed.value.with(missing),
         calibration,
         drawn,
         validation,

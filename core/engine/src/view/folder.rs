@@ -7,9 +7,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use lacuna::run::{Stop, files};
-use lacuna_run::{Artifact as _, Stage};
 
-use super::row::RunRow;
+use super::row::{self, RunRow};
 use super::watched::Watched;
 use crate::assess::Assessment;
 
@@ -111,7 +110,7 @@ impl ServedFolder {
 
     /// Assessment of the result of a run; `None` if there is none.
     pub(super) fn assessment(&self, run: &str) -> Option<Assessment> {
-        Assessment::load(&self.run(run)?.join(Stage::Assess.folder().name())).ok()
+        row::assessment(&row::summary(&self.run(run)?))
     }
 
     /// Rows of all runs.

@@ -5,10 +5,10 @@ use std::path::Path;
 use std::time::UNIX_EPOCH;
 
 use lacuna::run::files;
+use lacuna_run::RunDirectory;
 use lacuna_run::progress::Present;
 use lacuna_run::seen::{SeenStage, stages};
-use lacuna_run::{Artifact as _, RunDirectory, Stage};
-use serde::Serialize;
+use serde::{Deserialize as _, Serialize};
 use serde_json::Value;
 
 use crate::assess::{Assessment, Level};
@@ -100,8 +100,7 @@ impl RunRow {
             let open = stages.iter().rev().find(|stage| stage.record.is_none());
             open.map(|stage| label(&stage.folder).to_owned())
         });
-        let folder = root.join(Stage::Assess.folder().name());
-        let assessment = Assessment::load(&folder).ok().filter(|_| finished);
+        let assessment = assessment(summary).filter(|_| finished);
         let said = assessment.as_ref().map(Assessment::line);
         let share = present.filter(|p| p.total > 0).map(|p| p.done as f64 / p.total as f64);
         let ends = stages.iter().filter_map(|stage| Some(stage.record.as_ref()?.finished));
@@ -124,6 +123,11 @@ impl RunRow {
 
 /// File that is written when a run has finished.
 const MANIFEST: &str = "manifest.json";
+
+/// Assessment in a summary; `None` if there is none.
+pub(super) fn assessment(summary: &Value) -> Option<Assessment> {
+    Assessment::deserialize(summary.get("assessment")?).ok()
+}
 
 /// The results of a run; null if there are none.
 pub(super) fn summary(root: &Path) -> Value {

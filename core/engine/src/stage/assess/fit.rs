@@ -2,6 +2,7 @@
 
 use lacuna::data::measurements::Summary;
 use lacuna::data::{Coordinates, Measurements, Observations};
+use lacuna::math::moments::mean;
 use lacuna::math::random::Stream;
 use rayon::prelude::*;
 
@@ -27,7 +28,7 @@ pub(super) fn findings(judged: &Judged<'_>, all: &Artifacts<'_>) -> Vec<Finding>
     if let Some(validated) = all.validated.map(|kept| &kept.value) {
         found.extend(some([
             reference(judged, validated),
-            form(validated),
+            form(judged, validated),
             covered(judged, validated),
             accurate(judged, validated),
         ]));
@@ -54,14 +55,22 @@ fn reference(judged: &Judged<'_>, validated: &Validated) -> Option<Finding> {
     })
 }
 
-fn form(validated: &Validated) -> Option<Finding> {
+fn form(judged: &Judged<'_>, validated: &Validated) -> Option<Finding> {
     let of = |origin: &str| validated.spread.iter().find(|(o, _)| o == origin).map(|(_, sd)| *sd);
     if let (Some(form), Some(measurement)) = (of("model_form"), of("measurement")) {
         return check::model_form(form, measurement);
     }
-    let (all, replicates) = (of("discrepancy")?, of("replicates")?);
-    let rest = (all * all - replicates * replicates).max(0.0).sqrt();
-    check::model_form(rest, replicates)
+    let (all, noise) = (of("discrepancy")?, of("replicates").or_else(|| stated_noise(judged))?);
+    let rest = (all * all - noise * noise).max(0.0).sqrt();
+    check::model_form(rest, noise)
+}
+
+/// Root mean square of the noise that the study states; `None` unless it does for every output.
+fn stated_noise(judged: &Judged<'_>) -> Option<f64> {
+    let noise = judged.study.measurements.as_ref()?.common.noise.as_ref()?;
+    let outputs = judged.study.layouts.blocks.iter().flat_map(|block| noise.of(block));
+    let squares: Option<Vec<f64>> = outputs.map(|output| output.sd.map(|sd| sd * sd)).collect();
+    squares.filter(|squares| !squares.is_empty()).map(|squares| mean(&squares).sqrt())
 }
 
 fn covered(judged: &Judged<'_>, validated: &Validated) -> Option<Finding> {
