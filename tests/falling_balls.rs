@@ -70,7 +70,7 @@ fn study(drops: &BTreeMap<String, Drop>) -> String {
         use = "no_u_turn"
         metric = "dense"
         warm_up = 300
-        steps = 1300
+        steps = 800
         "#
     );
     for name in drops.keys() {

@@ -114,7 +114,7 @@ fn the_posterior_of_a_random_effect_is_exact() {
         ["sampler.use=\"adaptive_metropolis\"", "sampler.use=\"affine_invariant_ensemble\""]
     {
         let steps =
-            if sampler.contains("ensemble") { "sampler.steps=700" } else { "sampler.steps=4000" };
+            if sampler.contains("ensemble") { "sampler.steps=450" } else { "sampler.steps=2500" };
         let folder = written(|text| text);
         let findings = run(folder.path(), &[sampler, steps], "out");
         let found = &quick::described::summary_of(&findings)["parameters"]["location"];

@@ -55,7 +55,7 @@ variance = { half_normal = 1.0 }
 [sampler]
 use = "affine_invariant_ensemble"
 walkers = 16
-steps = 400
+steps = 200
 
 [gap]
 candidates = ["gain", "offset", "drift"]

@@ -174,10 +174,10 @@ fn columns_of_lower(a: &Matrix) -> Mat<f64> {
     let mut copy = Mat::zeros(n, n);
     for (rows, columns) in tiles_of_lower(n) {
         for j in columns {
-            let column = copy.col_as_slice_mut(j);
-            for i in rows.start.max(j)..rows.end {
-                column[i] = a[(i, j)];
-            }
+            let first = rows.start.max(j);
+            let own = a.as_slice()[first * n + j..].iter().step_by(n);
+            let column = &mut copy.col_as_slice_mut(j)[first..rows.end];
+            column.iter_mut().zip(own).for_each(|(to, from)| *to = *from);
         }
     }
     copy
@@ -188,11 +188,11 @@ fn rows_of_lower(a: &Mat<f64>) -> Matrix {
     let n = a.nrows();
     let mut copy = Matrix::zeros(n, n);
     for (rows, columns) in tiles_of_lower(n) {
-        for i in rows {
-            let row = copy.row_mut(i);
-            for j in columns.start..columns.end.min(i + 1) {
-                row[j] = a[(i, j)];
-            }
+        for j in columns {
+            let first = rows.start.max(j);
+            let own = &a.col_as_slice(j)[first..rows.end];
+            let row = copy.as_mut_slice()[first * n + j..].iter_mut().step_by(n);
+            row.zip(own).for_each(|(to, from)| *to = *from);
         }
     }
     copy
