@@ -174,8 +174,9 @@ pub(super) fn layouts(
         unit: response.unit.clone(),
         axes,
     };
+    let faulty = reader.is_none() && root.get("measurements").is_some();
     if scenarios.is_empty() {
-        let grids = Grids { reader, directory, scenario: None, measured: true };
+        let grids = Grids { reader, directory, scenario: None, measured: true, faulty };
         let axes = problems.within("response", |problems| grids.axes(own, node, problems))?;
         let before = problems.len();
         problems.within("response", |problems| {
@@ -197,7 +198,8 @@ pub(super) fn layouts(
             }
         }
         let name = Some(scenario.name.as_str());
-        let grids = Grids { reader, directory, scenario: name, measured: scenario.measured };
+        let measured = scenario.measured;
+        let grids = Grids { reader, directory, scenario: name, measured, faulty };
         let overridden =
             |path: &str| scenario.axes.0.iter().any(|(n, _)| path.ends_with(n.as_str()));
         let found = problems.within(&format!("scenario.{}", scenario.name), |problems| {
@@ -229,6 +231,8 @@ struct Grids<'a> {
     directory: &'a Path,
     scenario: Option<&'a str>,
     measured: bool,
+    /// True if the study has `[measurements]` with a fault, which is told there.
+    faulty: bool,
 }
 
 impl Grids<'_> {
@@ -245,8 +249,14 @@ impl Grids<'_> {
         let mut found = Vec::new();
         for (name, axis) in &axes.0 {
             let path = format!("axes.{}", name.as_str());
-            match axis.axis(name.as_str(), |unit| self.measured(name.as_str(), unit)) {
+            let mut needs_measurements = false;
+            let made = axis.axis(name.as_str(), |unit| {
+                needs_measurements = true;
+                self.measured(name.as_str(), unit)
+            });
+            match made {
                 Ok(axis) => found.push(axis),
+                Err(_) if needs_measurements && self.faulty => {}
                 Err(reason) => {
                     let message = format!("the axis `{}`: {reason}", name.as_str());
                     Complaints::new(node(&path), problems).at(&path).say(message);
