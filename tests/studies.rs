@@ -343,7 +343,7 @@ fn the_helium_study_runs_with_each_of_its_models() {
         "surrogate.degree=1",
         "sampler.use=metropolis",
         "sampler.start=prior",
-        "sampler.steps=100",
+        "sampler.steps=30",
         "validate.emulator_check=1",
     ];
     let folder = tempfile::tempdir().unwrap();

@@ -350,7 +350,7 @@ fn the_study_with_the_drag_is_written_and_run() {
     let (g, terminal) = (9.81, 20.0);
     let fall = |t: f64| terminal * terminal / g * (g * t / terminal).cosh().ln();
     let times: Vec<f64> = (1..=50).map(|i| 0.03 * f64::from(i)).collect();
-    let rest = REST.replace(r#"ensemble""#, "ensemble\"\nwalkers = 16\nsteps = 400");
+    let rest = REST.replace(r#"ensemble""#, "ensemble\"\nwalkers = 16\nsteps = 200");
     let own = "\n[gap]\ncandidates = [\"gain\", \"drift\"]\nsimulations = 99\n";
     let (folder, study) = study(&[FALL, &rest, own, DRAGS].concat(), fall, &times, 0.02);
     let path = folder.path().join("study.toml");

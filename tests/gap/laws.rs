@@ -9,6 +9,7 @@ use lacuna_engine::augment::{Begun, add};
 use lacuna_engine::gap::result::GapResult;
 use lacuna_engine::gap::result::law::Law;
 use lacuna_engine::gap::search::VerdictKind;
+use lacuna_engine::report::gap_text;
 use lacuna_run::RunDirectory;
 
 use super::inside::loaded;
@@ -108,6 +109,10 @@ fn searched(
     let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
     let findings = lacuna_engine::pipeline::find_gap(&study, &mut run, &Silent).unwrap();
     let gap = findings.gap.as_ref().unwrap();
+    // A proof by blocks of one record says what it does not show.
+    let similar = "Blocks of one record do not tell similar forms apart";
+    let is_proven = replicates == 1 && gap.proof().is_some_and(|proof| proof.passed);
+    assert_eq!(gap_text(&findings).contains(similar), is_proven);
     let law = gap.result.law.as_ref();
     if let Some(law) = law {
         println!("{}", law.words().join("\n"));

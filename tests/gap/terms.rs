@@ -50,7 +50,7 @@ variance = { half_normal = 1.0 }
 [sampler]
 use = "affine_invariant_ensemble"
 walkers = 16
-steps = 300
+steps = 100
 "#;
 
 const PLAIN: Oscillator =
@@ -163,7 +163,7 @@ variance = { half_normal = 1.0 }
 [sampler]
 use = "affine_invariant_ensemble"
 walkers = 16
-steps = 300
+steps = 100
 "#;
 
 /// An actuator that cannot follow its drive beyond 0.6 m. Its drive is a table of the time, which the terms of the library

@@ -7,15 +7,16 @@ use std::time::Instant;
 use generator::single::{Record, record};
 use lacuna::run::Silent;
 use lacuna_bench::clock::timed;
+use lacuna_engine::gap::result::names::{NameProof, RivalComparison};
 use lacuna_engine::gap::result::{GapResult, StepResult};
-use lacuna_engine::gap::search::{MissingEffect, VerdictKind};
+use lacuna_engine::gap::search::{MissingEffect, PROVEN, VerdictKind};
 use lacuna_engine::study::resolve::load_text;
 use lacuna_run::RunDirectory;
 
 use crate::studies::{study, table};
 
 /// The names of the columns.
-pub const HEADER: &str = "case\tsystem\thidden\tform\tinstrument\tstated\tvalues\tratio\tjudged\tverdict\teffects\tprobability\tclosed\tinterval\tnoise_said\tseconds\tprocessor\ttraits";
+pub const HEADER: &str = "case\tsystem\thidden\tform\tinstrument\tstated\tvalues\tratio\tjudged\tverdict\teffects\tprobability\tclosed\tinterval\tnoise_said\tproof\tseconds\tprocessor\ttraits";
 
 /// The judgement of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,6 +35,36 @@ pub enum Judgement {
     Missed,
 }
 
+/// Outcome of the proof on left-out data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Proven {
+    /// By the standard error of the parts together.
+    Passed,
+    /// Some name only because every part favours it.
+    ByEachPart,
+    /// Not proven.
+    Failed,
+}
+
+impl Proven {
+    fn of(proof: &NameProof) -> Self {
+        let by_error = |rival: &RivalComparison| rival.score.is_better(PROVEN);
+        match (proof.passed, proof.rivals.iter().all(by_error)) {
+            (true, true) => Self::Passed,
+            (true, false) => Self::ByEachPart,
+            (false, _) => Self::Failed,
+        }
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::ByEachPart => "passed by each part",
+            Self::Failed => "failed",
+        }
+    }
+}
+
 /// A case with its answer.
 pub struct Answer {
     index: usize,
@@ -47,6 +78,8 @@ pub struct Answer {
     closed: Option<(f64, [f64; 2])>,
     /// True when the verdict says what was taken for noise.
     pub noise_said: bool,
+    /// Outcome of the proof on left-out data; `None` without names.
+    pub proven: Option<Proven>,
     /// Wall time and processor time.
     pub seconds: [f64; 2],
 }
@@ -72,16 +105,17 @@ pub fn ask(seed: u64, index: usize) -> Result<Answer, Box<dyn Error>> {
         timed(|| lacuna_engine::pipeline::find_gap(&loaded, &mut run, &Silent))?;
     let (findings, seconds) = (findings?, begun.elapsed().as_secs_f64());
     fs::remove_dir_all(&folder)?;
-    let result = findings.gap.ok_or("the study has no gap")?.result;
-    Ok(Answer::of(index, record, stated, &result, [seconds, processor]))
+    let gap = findings.gap.ok_or("the study has no gap")?;
+    let proof = gap.proof().as_ref().map(Proven::of);
+    Ok(Answer::of(index, (record, stated), &gap.result, proof, [seconds, processor]))
 }
 
 impl Answer {
     fn of(
         index: usize,
-        record: Record,
-        stated: bool,
+        (record, stated): (Record, bool),
         result: &GapResult,
+        proven: Option<Proven>,
         seconds: [f64; 2],
     ) -> Self {
         let verdict = &result.verdict;
@@ -96,6 +130,7 @@ impl Answer {
             effects: verdict.effects.clone(),
             closed: proof.map(|all| (all.closed, [all.lower, all.upper])),
             noise_said: verdict.reasons.iter().any(|reason| reason.contains("taken for noise")),
+            proven,
             seconds,
         }
     }
@@ -156,7 +191,7 @@ impl Answer {
             format!("{:.0} %\t{:.0} to {:.0} %", 100.0 * closed, 100.0 * low, 100.0 * high)
         });
         format!(
-            "{}\t{:?}\t{}\t{form}\t{}\t{}\t{}\t{ratio:.1}\t{:?}\t{:?}\t{}\t{}\t{closed}\t{}\t{:.1}\t{:.1}\t{}",
+            "{}\t{:?}\t{}\t{form}\t{}\t{}\t{}\t{ratio:.1}\t{:?}\t{:?}\t{}\t{}\t{closed}\t{}\t{}\t{:.1}\t{:.1}\t{}",
             self.index,
             system.kind,
             missing.name,
@@ -168,6 +203,7 @@ impl Answer {
             names.join(" + "),
             probabilities.join(" "),
             self.noise_said,
+            self.proven.map_or("-", Proven::word),
             self.seconds[0],
             self.seconds[1],
             self.effects.iter().map(|e| self.traits(e)).collect::<Vec<_>>().join(" & ")

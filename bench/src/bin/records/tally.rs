@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use lacuna::diagnose::coverage::binomial::interval;
 use lacuna_engine::gap::search::VerdictKind;
 
-use crate::case::{Answer, Judgement};
+use crate::case::{Answer, Judgement, Proven};
 
 /// Sort of a case.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -23,6 +23,7 @@ struct Counted {
     stated: bool,
     judged: Judgement,
     silent: bool,
+    proven: Option<Proven>,
     seconds: f64,
 }
 
@@ -47,6 +48,7 @@ impl Tally {
             stated: answer.stated,
             judged: answer.judged(),
             silent: none && !answer.noise_said,
+            proven: answer.proven,
             seconds: answer.seconds[0],
         });
     }
@@ -56,8 +58,12 @@ impl Tally {
         let mut text =
             "| | noise assumed | | noise stated | |\n| --- | --- | --- | --- | --- |\n".to_owned();
         let is = |judged: Judgement| move |case: &Counted| case.judged == judged;
+        let passed = |case: &Counted| case.proven.is_some_and(|proof| proof != Proven::Failed);
+        let is_right: fn(&Counted) -> bool = |case| {
+            case.proven.is_some() && matches!(case.judged, Judgement::Right | Judgement::Part)
+        };
         let false_name = |case: &Counted| case.judged == Judgement::False;
-        let rows: [Row<'_>; 12] = [
+        let rows: [Row<'_>; 16] = [
             ("form of a term: right names", |c| c.hidden == Hidden::Exact, &is(Judgement::Right)),
             ("part of a sum named", |c| c.hidden == Hidden::Exact, &is(Judgement::Part)),
             ("a near form named", |c| c.hidden == Hidden::Exact, &is(Judgement::Near)),
@@ -81,6 +87,22 @@ impl Tally {
                 "not found, without a word about the noise",
                 |c| c.hidden != Hidden::Nothing,
                 &|c: &Counted| c.silent,
+            ),
+            ("right or a part of a sum, named: proof passed", is_right, &passed),
+            (
+                "a near form named: proof passed",
+                |c| c.judged == Judgement::Near && c.proven.is_some(),
+                &passed,
+            ),
+            (
+                "false name: proof passed",
+                |c| c.judged == Judgement::False && c.proven.is_some(),
+                &passed,
+            ),
+            (
+                "names: passed only because each part favours them",
+                |c| c.proven.is_some(),
+                &|c: &Counted| c.proven == Some(Proven::ByEachPart),
             ),
         ];
         for (what, among, holds) in rows {

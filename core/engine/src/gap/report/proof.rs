@@ -2,9 +2,11 @@
 
 use maud::Markup;
 
+use crate::gap::experiment::hold_out::HeldOutKind;
 use crate::gap::report::sentences::{capitalised, probability};
 use crate::gap::result::names::{NameProof, ProofKind, RivalComparison};
 use crate::gap::result::{GapFindings, names};
+use crate::gap::search::LeftOut;
 use crate::page::number::{fixed, significant, typeset};
 use crate::page::scale::ShownUnit;
 use crate::page::table::Table;
@@ -13,6 +15,10 @@ use crate::page::{Caption, Numbers};
 /// The limit of a proof by replicates alone.
 pub const LIMIT: &str =
     "replicates share the mean curve, so this does not show that the effect holds elsewhere";
+
+/// The limit of a proof by blocks of one record; `docs/gap_rates.md` counts how often false names pass it.
+const SIMILAR: &str =
+    " Blocks of one record do not tell similar forms apart: another condition would.";
 
 /// The outcome of the proof in words; empty without effects.
 pub fn sentences(gap: &GapFindings) -> Vec<String> {
@@ -33,9 +39,10 @@ fn outcome(gap: &GapFindings, proof: &NameProof) -> String {
     let against = names::contradiction(gap.held_out());
     match (proof.kind, proof.passed) {
         (ProofKind::Transfer, true) => format!(
-            "Proof passed: the name transfers. On left-out data it predicts better than its rival, {}: {}.",
+            "Proof passed: the name transfers. On left-out data it predicts better than its rival, {}: {}.{}",
             rival(gap),
-            listed(&proof.rivals.iter().collect::<Vec<_>>())
+            listed(&proof.rivals.iter().collect::<Vec<_>>()),
+            if is_of_one_record(gap, proof) { SIMILAR } else { "" }
         ),
         (ProofKind::Reproducible, true) => {
             format!("Reproducible: the gap closes on data that were not used; {LIMIT}.")
@@ -58,6 +65,13 @@ fn outcome(gap: &GapFindings, proof: &NameProof) -> String {
         }
         (_, false) => "Not proven: there is no sure name.".to_owned(),
     }
+}
+
+/// True if nothing but parts of the curves was left out or held out.
+fn is_of_one_record(gap: &GapFindings, proof: &NameProof) -> bool {
+    let elsewhere = [HeldOutKind::Scenarios, HeldOutKind::Curves, HeldOutKind::Replicates];
+    let is_held_out = gap.held_out().iter().any(|part| elsewhere.contains(&part.kind));
+    !is_held_out && proof.rivals.iter().all(|rival| rival.score.left_out == LeftOut::Block)
 }
 
 fn rival(gap: &GapFindings) -> &'static str {
