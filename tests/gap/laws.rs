@@ -162,9 +162,8 @@ fn a_drag_with_the_power_three_halves_is_a_law() {
     three_halves_in(6, 2e-3);
 }
 
-/// The same in one record: `cargo test --workspace --test all -- --ignored gap::laws`.
+/// The same in one record.
 #[test]
-#[ignore = "the law is found in replicates by the test above, other laws in records by those below"]
 fn a_drag_with_the_power_three_halves_is_a_law_in_one_record() {
     three_halves_in(1, 1e-3);
 }

@@ -5,7 +5,8 @@ use super::{Finding, Rule, Severity};
 
 const CODE: &str = "missing_effect";
 
-/// Shifts of an estimate, in posterior standard deviations, that give a reservation and a failure: as for the emulator's errors.
+/// Shifts of an estimate, in posterior standard deviations, from which on the message names it, and above which there is a failure: the
+/// thresholds of the emulator's errors.
 const SHIFT: (f64, f64) = (0.5, 1.0);
 
 const ADD: &str = "use the study with the missing effect, which `lacuna gap STUDY` writes and runs";
@@ -37,9 +38,9 @@ pub struct EstimateChange {
     pub shift: f64,
 }
 
-/// Finding about missing effects, given as a sentence, and the changes of the estimates that they cause; `is_named` is false
-/// for a gap whose cause has no name.
-pub fn effect(sentence: &str, changes: &[EstimateChange], is_named: bool) -> Finding {
+/// Finding about missing effects, given as a sentence, and the changes of the estimates that they cause; `is_added` is false
+/// if no study with them is to be written: their cause has no name, or held-out data contradict it.
+pub fn effect(sentence: &str, changes: &[EstimateChange], is_added: bool) -> Finding {
     let most = changes.iter().max_by(|a, b| a.shift.abs().total_cmp(&b.shift.abs()));
     let largest = most.map_or(0.0, |change| change.shift.abs());
     let consequence = match most {
@@ -48,12 +49,12 @@ pub fn effect(sentence: &str, changes: &[EstimateChange], is_named: bool) -> Fin
             change.parameter,
             short(change.shift)
         ),
-        _ if is_named => "the predictions of the model lack it".to_owned(),
+        _ if is_added => "the predictions of the model lack it".to_owned(),
         _ => "how far the estimates compensate for it is unknown".to_owned(),
     };
     let severity = if largest > SHIFT.1 { Severity::Failure } else { Severity::Reservation };
     let message = format!("{}: {consequence}", sentence.trim_end_matches('.'));
-    let action = if is_named { ADD } else { UNNAMED };
+    let action = if is_added { ADD } else { UNNAMED };
     Finding::new((CODE, ""), (largest, SHIFT.1), severity, message, action)
 }
 
@@ -76,11 +77,11 @@ mod tests {
 
     #[test]
     fn an_effect_that_moves_nothing_and_a_gap_without_a_name_are_reservations() {
-        for (changes, is_named, words) in [
+        for (changes, is_added, words) in [
             (vec![change("mass", 0.2)], true, "the predictions of the model lack it"),
             (Vec::new(), false, "how far the estimates compensate for it is unknown"),
         ] {
-            let found = effect("Something is missing.", &changes, is_named);
+            let found = effect("Something is missing.", &changes, is_added);
             assert_eq!(found.severity, Severity::Reservation);
             assert!(found.message.ends_with(words), "{}", found.message);
         }

@@ -9,16 +9,16 @@ use crate::gap::search::VerdictKind;
 
 /// The finding; `None` if nothing is missing that the data can show.
 pub fn finding(gap: &GapResult, calibration: &CalibrationFindings) -> Option<Finding> {
-    let is_named = match gap.verdict.word {
-        VerdictKind::None | VerdictKind::NotVisible => return None,
-        VerdictKind::Unlisted => false,
-        VerdictKind::Named | VerdictKind::Approximate | VerdictKind::Class => true,
-    };
+    if matches!(gap.verdict.word, VerdictKind::None | VerdictKind::NotVisible) {
+        return None;
+    }
+    // A name that held-out data contradict is in no study.
+    let is_added = !gap.worth_adding().is_empty();
     let change = |shift: &Shift| {
         let own = calibration.coordinates.iter().find(|own| own.name == shift.name)?;
         let change = (shift.value[1] - shift.value[0]) / own.sd;
         change.is_finite().then(|| EstimateChange { parameter: own.name.clone(), shift: change })
     };
     let changes: Vec<EstimateChange> = gap.parameters.iter().filter_map(change).collect();
-    Some(effect(&verdict(gap), &changes, is_named))
+    Some(effect(&verdict(gap), &changes, is_added))
 }
