@@ -5,6 +5,7 @@
 
 mod coordinates;
 mod noise;
+mod pools;
 mod rats;
 mod simulated;
 mod targets;
@@ -48,6 +49,11 @@ fn reference() -> Value {
     serde_json::from_str(&fs::read_to_string(quick::root().join(file)).unwrap()).unwrap()
 }
 
+/// The parameter of a school in `schools.toml`.
+fn of_school(school: &str) -> String {
+    format!("effect[{school}]")
+}
+
 const SCHOOLS: [&str; 8] = ["A", "B", "C", "D", "E", "F", "G", "H"];
 
 /// Rubin's eight schools (Journal of Educational Statistics 6 (1981) 377), whose model is the identity.
@@ -64,13 +70,13 @@ fn schools(more: &str) -> TempDir {
     folder
 }
 
-/// Requires mean and standard deviation of the reference draws of posteriordb for all effects, location and scale.
-fn has_the_reference(summary: &Value) {
+/// Requires mean and standard deviation of the reference draws of posteriordb for the effects of all schools, which are the
+/// unknowns `of_school`, and for location and scale of `population`.
+fn has_the_reference(summary: &Value, of_school: &dyn Fn(&str) -> String, population: &str) {
     let published = reference();
-    let of_effects =
-        (1..=8).map(|k| (format!("theta[{k}]"), format!("effect[{}]", SCHOOLS[k - 1])));
-    let others = [("mu", "effect.mean"), ("tau", "effect.sd")];
-    let others = others.map(|(theirs, ours)| (theirs.to_owned(), ours.to_owned()));
+    let of_effects = (1..=8).map(|k| (format!("theta[{k}]"), of_school(SCHOOLS[k - 1])));
+    let others = [("mu", "mean"), ("tau", "sd")];
+    let others = others.map(|(theirs, ours)| (theirs.to_owned(), format!("{population}.{ours}")));
     for (theirs, ours) in of_effects.chain(others) {
         let reference = &published["reference"][&theirs];
         let found = &summary["parameters"][&ours];
@@ -107,7 +113,7 @@ fn in_coordinates(coordinates: &str, settings: &[&str]) {
     let ran = run(folder.path(), &[&[set.as_str()], settings].concat());
     let summary = quick::summary(&folder.path().join("out"));
     eprintln!("{coordinates}: {}", summary["parameters"]["effect.sd"]);
-    has_the_reference(&summary);
+    has_the_reference(&summary, &of_school, "effect");
     has_the_evidence(&summary);
     conditionals_are_normal(&ran);
     a_new_member_has_the_total_variance(&ran, &summary);
@@ -173,7 +179,7 @@ fn a_school_without_data_is_a_new_member() {
     let folder = schools(predict);
     let ran = run(folder.path(), &[]);
     let summary = quick::summary(&folder.path().join("out"));
-    has_the_reference(&summary);
+    has_the_reference(&summary, &of_school, "effect");
     let population = &summary["populations"]["effect"];
     let (own, new) = (&summary["parameters"]["effect[I]"], &population["new_member"]);
     let error = number(own, "/mcse_mean");

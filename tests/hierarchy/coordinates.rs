@@ -50,6 +50,7 @@ fn parts(form: Form, centred: Option<f64>) -> (Vec<Parameter>, Dependence, OneEa
         name: "x".into(),
         form,
         members: vec![0, 1, 2],
+        groups: ["a", "b", "c"].map(String::from).to_vec(),
         location: 3,
         scale: 4,
         typical: 0.54,
@@ -160,9 +161,7 @@ fn pooling_is_that_of_the_normal_model() {
     for form in [Form::Normal, Form::LogNormal] {
         let (parameters, dependence, likelihood) = parts(form, None);
         let posterior = Posterior::new(JointPrior::new(&parameters, &dependence), likelihood);
-        let groups = ["a", "b", "c"].map(|name| Some(name.to_owned()));
-        let groups = [groups.as_slice(), &[None, None]].concat();
-        let found = posterior.information(&NATURAL, &groups);
+        let found = posterior.information(&NATURAL);
         assert_eq!(found.len(), 3);
         for (g, together) in found.iter().enumerate() {
             let (data, scatter) = (SD[g] * SD[g], NATURAL[4] * NATURAL[4]);

@@ -88,7 +88,7 @@ fn independent(study: &Study) -> Result<(), Stop> {
             Stop::new(text).help("search with a copy of the study that has a `[surrogate]`")
         );
     }
-    if !study.dependence.populations.is_empty() || study.hierarchy.trained.is_some() {
+    if study.has_populations() || study.hierarchy.trained.is_some() {
         let text = "the search for missing physics does not know populations, nor parameters by group with a surrogate";
         return Err(Stop::new(text).help(
             "search with a copy of the study whose parameters have neither `by` nor `population`",

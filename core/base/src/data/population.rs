@@ -18,7 +18,7 @@ pub enum Form {
     StudentT(f64),
 }
 
-/// A population: the places of its members and of its two unknowns among all parameters.
+/// A population: the places of its members and of its two unknowns among all parameters, or among the unknowns besides them.
 ///
 /// ```text
 /// p(members, location, scale) = p(location) p(scale) prod_g f(member_g | location, scale)
@@ -33,6 +33,9 @@ pub struct Population {
     pub form: Form,
     /// Places of the members.
     pub members: Vec<usize>,
+    /// Group to which each member belongs, such as `target=T24`.
+    #[serde(skip)]
+    pub groups: Vec<String>,
     /// Place of the mean, median or location.
     pub location: usize,
     /// Place of the standard deviation or scale.
@@ -68,6 +71,41 @@ impl Population {
         match self.form {
             Form::LogNormal => [-(pull / scale + 1.0) / value, pull / (scale * location), by_scale],
             Form::Normal | Form::StudentT(_) => [-pull / scale, pull / scale, by_scale],
+        }
+    }
+
+    /// Log density of all members at a point of all unknowns.
+    pub fn log_density_of_members(&self, point: &[f64]) -> f64 {
+        let (location, scale) = (point[self.location], point[self.scale]);
+        self.members.iter().map(|&j| self.log_density(point[j], location, scale)).sum()
+    }
+
+    /// Adds the derivatives of [`Self::log_density_of_members`].
+    pub fn add_gradient(&self, point: &[f64], gradient: &mut [f64]) {
+        for &j in &self.members {
+            let [own, by_location, by_scale] =
+                self.derivatives(point[j], point[self.location], point[self.scale]);
+            gradient[j] += own;
+            gradient[self.location] += by_location;
+            gradient[self.scale] += by_scale;
+        }
+    }
+
+    /// Draws all members, given location and scale at the point.
+    pub fn draw_members(&self, point: &mut [f64], rng: &mut impl Rng) {
+        for &j in &self.members {
+            point[j] = self.sample(point[self.location], point[self.scale], rng);
+        }
+    }
+
+    /// The same population where all unknowns come this many places later.
+    #[must_use]
+    pub fn behind(&self, places: usize) -> Self {
+        Self {
+            members: self.members.iter().map(|j| j + places).collect(),
+            location: self.location + places,
+            scale: self.scale + places,
+            ..self.clone()
         }
     }
 
@@ -111,11 +149,11 @@ mod tests {
     use super::*;
 
     fn population(form: Form) -> Population {
-        let members = vec![0, 1];
         Population {
             name: "x".into(),
             form,
-            members,
+            members: vec![0, 1],
+            groups: vec!["a".into(), "b".into()],
             location: 2,
             scale: 3,
             typical: 1.0,

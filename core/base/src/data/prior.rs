@@ -193,12 +193,8 @@ impl<'a> JointPrior<'a> {
             group.copula.log_ratio(&marginals, &values)
         };
         let groups: f64 = self.dependence.groups.iter().map(of).sum();
-        let in_population = |population: &Population| -> f64 {
-            let (location, scale) = (point[population.location], point[population.scale]);
-            let each = population.members.iter();
-            each.map(|&j| population.log_density(point[j], location, scale)).sum()
-        };
-        let members: f64 = self.dependence.populations.iter().map(in_population).sum();
+        let populations = self.dependence.populations.iter();
+        let members: f64 = populations.map(|own| own.log_density_of_members(point)).sum();
         groups + members - self.dependence.share.map_or(0.0, Share::log)
     }
 
@@ -212,14 +208,7 @@ impl<'a> JointPrior<'a> {
             }
         }
         for population in &self.dependence.populations {
-            let (location, scale) = (population.location, population.scale);
-            for &j in &population.members {
-                let [own, by_location, by_scale] =
-                    population.derivatives(point[j], point[location], point[scale]);
-                gradient[j] += own;
-                gradient[location] += by_location;
-                gradient[scale] += by_scale;
-            }
+            population.add_gradient(point, gradient);
         }
     }
 
@@ -275,10 +264,7 @@ impl<'a> JointPrior<'a> {
             }
         }
         for population in &self.dependence.populations {
-            for &j in &population.members {
-                point[j] =
-                    population.sample(point[population.location], point[population.scale], rng);
-            }
+            population.draw_members(&mut point, rng);
         }
         point
     }

@@ -101,6 +101,11 @@ impl<'a> Ground<'a> {
             // Fails early if the replicates are too few, before the model is run.
             of_replicates(&measured.used, &vec![0.0; study.layouts.len()], &random)?;
         }
+        if !study.pools().is_empty() {
+            let text = "the truths of unknowns of the discrepancy and of effects are drawn one by one, not from a population";
+            return Err(Stop::new(text)
+                .help("count the coverage of a copy of the study without `population` there"));
+        }
         let parts = Parts::of(study, measured, &base.problem(0))?;
         let own = parts.likelihood().hyperparameters().len();
         let hyper = parts.posterior(study, &base.problem(0)).hyperparameters().to_vec();

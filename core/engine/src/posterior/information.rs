@@ -8,7 +8,7 @@ use super::Posterior;
 /// Members that the data determine together: those of one group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Together {
-    /// Places of the members among the parameters.
+    /// Places of the members among the unknowns.
     pub places: Vec<usize>,
     /// Negative second derivatives of the log-likelihood by these members, on the scale of their populations (values or
     /// logarithms), with all other unknowns fixed.
@@ -42,15 +42,15 @@ impl Together {
 }
 
 impl Posterior<'_> {
-    /// Information of the data about the members of each group at natural values; `groups` has the name of each parameter's
-    /// group, and none for a parameter without.
-    pub fn information(&self, natural: &[f64], groups: &[Option<String>]) -> Vec<Together> {
+    /// Information of the data about the members of each group at natural values.
+    pub fn information(&self, natural: &[f64]) -> Vec<Together> {
         let mut found: Vec<(&String, Vec<(usize, &Population)>)> = Vec::new();
-        for (place, population) in self.members.places() {
-            let Some(group) = groups.get(place).and_then(Option::as_ref) else { continue };
-            match found.iter_mut().find(|(other, _)| *other == group) {
-                Some((_, members)) => members.push((place, population)),
-                None => found.push((group, vec![(place, population)])),
+        for population in self.populations() {
+            for (&place, group) in population.members.iter().zip(&population.groups) {
+                match found.iter_mut().find(|(other, _)| *other == group) {
+                    Some((_, members)) => members.push((place, population)),
+                    None => found.push((group, vec![(place, population)])),
+                }
             }
         }
         found.iter().map(|(_, members)| self.together(natural, members)).collect()

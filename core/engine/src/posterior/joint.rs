@@ -52,6 +52,13 @@ impl Joint {
         }
         Self { blocks, hyper }
     }
+
+    /// The same likelihood with further unknowns, behind all others, on which it does not depend.
+    #[must_use]
+    pub fn with_besides(mut self, unknowns: Vec<Hyperparameter>) -> Self {
+        self.hyper.extend(unknowns);
+        self
+    }
 }
 
 impl Joint {
@@ -216,6 +223,9 @@ impl Likelihood for Joint {
     }
 
     fn facts(&self) -> Vec<Fact> {
+        if let [block] = &self.blocks[..] {
+            return block.likelihood.facts();
+        }
         let mut facts = vec![Fact::new("blocks of scenarios with equal axes", self.blocks.len())];
         for (i, block) in self.blocks.iter().enumerate() {
             let numbered =

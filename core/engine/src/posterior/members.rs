@@ -13,12 +13,15 @@
 //! coordinates are independent at `c = 1 - B`, the share of the population's variance that the data take away
 //! (Papaspiliopoulos, Roberts and Sköld, Statistical Science 22 (2007) 59). The scale is represented by its logarithm.
 
-use lacuna::data::{Dependence, Form, Population};
+use std::sync::Arc;
+
+use lacuna::data::{Form, Population};
 
 /// A member of a population, by its place among the coordinates.
 #[derive(Debug, Clone)]
-struct Member<'a> {
-    population: &'a Population,
+struct Member {
+    /// Index of the population.
+    population: usize,
     place: usize,
     centred: f64,
     /// Precision of what the data say of it, on the scale of the population; zero before it is known.
@@ -39,21 +42,26 @@ pub(super) enum Jacobian {
 
 /// Coordinates of all members; see the module.
 #[derive(Debug, Clone)]
-pub(super) struct Members<'a> {
-    populations: &'a [Population],
-    members: Vec<Member<'a>>,
+pub(super) struct Members {
+    populations: Arc<[Population]>,
+    members: Vec<Member>,
 }
 
-impl<'a> Members<'a> {
+impl Members {
     /// Coordinates that are centred as the study says, or not at all where it leaves that to the data.
-    pub(super) fn of(dependence: &'a Dependence) -> Self {
-        let populations = dependence.populations.as_slice();
-        let each = populations.iter().flat_map(|population| {
-            let centred = population.centred.unwrap_or(0.0);
+    pub(super) fn of(populations: Vec<Population>) -> Self {
+        let each = populations.iter().enumerate().flat_map(|(population, own)| {
+            let centred = own.centred.unwrap_or(0.0);
             let member = move |&place| Member { population, place, centred, information: 0.0 };
-            population.members.iter().map(member)
+            own.members.iter().map(member)
         });
-        Self { populations, members: each.collect() }
+        let members = each.collect();
+        Self { populations: populations.into(), members }
+    }
+
+    /// The populations.
+    pub(super) fn populations(&self) -> &[Population] {
+        &self.populations
     }
 
     /// True if there are no populations.
@@ -61,9 +69,13 @@ impl<'a> Members<'a> {
         self.members.is_empty()
     }
 
-    /// Places of the members and their populations, in the order of [`Self::set`].
-    pub(super) fn places(&self) -> impl Iterator<Item = (usize, &'a Population)> {
-        self.members.iter().map(|member| (member.place, member.population))
+    /// True if the coordinate at a place is that of a member.
+    pub(super) fn has(&self, place: usize) -> bool {
+        self.members.iter().any(|member| member.place == place)
+    }
+
+    fn of_member(&self, member: &Member) -> &Population {
+        &self.populations[member.population]
     }
 
     /// Degree to which each member is centred.
@@ -75,7 +87,7 @@ impl<'a> Members<'a> {
     /// the data.
     pub(super) fn set(&mut self, centred: &[f64], information: &[f64]) {
         for (member, &centred) in self.members.iter_mut().zip(centred) {
-            member.centred = member.population.centred.unwrap_or(centred);
+            member.centred = self.populations[member.population].centred.unwrap_or(centred);
         }
         for (member, &information) in self.members.iter_mut().zip(information) {
             member.information = information;
@@ -89,24 +101,24 @@ impl<'a> Members<'a> {
 
     /// Converts coordinates to natural values, in place.
     pub(super) fn natural(&self, point: &mut [f64]) {
-        for population in self.populations {
+        for population in &*self.populations {
             point[population.scale] = point[population.scale].exp();
         }
         for member in &self.members {
-            let (m, ratio) = member.frame(point);
+            let (m, ratio) = self.frame(member, point);
             let u = m + ratio * (point[member.place] - member.centred * m);
-            point[member.place] = if member.is_log() { u.exp() } else { u };
+            point[member.place] = if self.is_log(member) { u.exp() } else { u };
         }
     }
 
     /// Converts natural values to coordinates, in place.
     pub(super) fn coordinates(&self, natural: &mut [f64]) {
         for member in &self.members {
-            let (m, ratio) = member.frame(natural);
-            let u = member.population.linear(natural[member.place]);
+            let (m, ratio) = self.frame(member, natural);
+            let u = self.of_member(member).linear(natural[member.place]);
             natural[member.place] = (u - m) / ratio + member.centred * m;
         }
-        for population in self.populations {
+        for population in &*self.populations {
             natural[population.scale] = natural[population.scale].ln();
         }
     }
@@ -114,12 +126,13 @@ impl<'a> Members<'a> {
     /// Logarithm of the Jacobian at natural values.
     pub(super) fn log_jacobian(&self, natural: &[f64], jacobian: Jacobian) -> f64 {
         let scales: f64 = self.populations.iter().map(|p| natural[p.scale].ln()).sum();
-        let of = |member: &Member<'_>| {
-            let scale = (natural[member.population.scale] / member.population.typical).ln();
-            let own = if member.is_log() { natural[member.place].ln() } else { 0.0 };
+        let of = |member: &Member| {
+            let population = self.of_member(member);
+            let scale = (natural[population.scale] / population.typical).ln();
+            let own = if self.is_log(member) { natural[member.place].ln() } else { 0.0 };
             let width = match jacobian {
                 Jacobian::Whole => 0.0,
-                Jacobian::Marginal => -0.5 * member.determined(natural).ln_1p(),
+                Jacobian::Marginal => -0.5 * self.determined(member, natural).ln_1p(),
             };
             member.degree(jacobian) * scale + own + width
         };
@@ -130,23 +143,22 @@ impl<'a> Members<'a> {
     pub(super) fn pull_back(&self, natural: &[f64], jacobian: Jacobian, gradient: &mut [f64]) {
         let mut by_log_scale = vec![0.0; self.populations.len()];
         for member in &self.members {
-            let (m, ratio) = member.frame(natural);
+            let population = self.of_member(member);
+            let (m, ratio) = self.frame(member, natural);
             let (value, c) = (natural[member.place], member.centred);
-            let (by_linear, by_median) = if member.is_log() {
-                (gradient[member.place] * value + 1.0, 1.0 / natural[member.population.location])
+            let (by_linear, by_median) = if self.is_log(member) {
+                (gradient[member.place] * value + 1.0, 1.0 / natural[population.location])
             } else {
                 (gradient[member.place], 1.0)
             };
             gradient[member.place] = by_linear * ratio;
-            gradient[member.population.location] += by_linear * (1.0 - ratio * c) * by_median;
-            let u = member.population.linear(value);
-            let own = self.populations.iter().position(|p| std::ptr::eq(p, member.population));
-            if let Some(k) = own {
-                by_log_scale[k] += by_linear * (1.0 - c) * (u - m) + member.degree(jacobian);
-                if jacobian == Jacobian::Marginal {
-                    let determined = member.determined(natural);
-                    by_log_scale[k] -= determined / (1.0 + determined);
-                }
+            gradient[population.location] += by_linear * (1.0 - ratio * c) * by_median;
+            let u = population.linear(value);
+            let slope = &mut by_log_scale[member.population];
+            *slope += by_linear * (1.0 - c) * (u - m) + member.degree(jacobian);
+            if jacobian == Jacobian::Marginal {
+                let determined = self.determined(member, natural);
+                *slope -= determined / (1.0 + determined);
             }
         }
         for (population, own) in self.populations.iter().zip(by_log_scale) {
@@ -157,7 +169,7 @@ impl<'a> Members<'a> {
 
     /// Bounds of the coordinates that belong to populations, from those of natural values, in place.
     pub(super) fn bounds(&self, bounds: &mut [(f64, f64)]) {
-        for population in self.populations {
+        for population in &*self.populations {
             let (low, high) = bounds[population.scale];
             bounds[population.scale] = (low.max(0.0).ln(), high.ln());
         }
@@ -165,30 +177,31 @@ impl<'a> Members<'a> {
             bounds[member.place] = (f64::NEG_INFINITY, f64::INFINITY);
         }
     }
-}
 
-impl Member<'_> {
-    fn is_log(&self) -> bool {
-        self.population.form == Form::LogNormal
+    fn is_log(&self, member: &Member) -> bool {
+        self.of_member(member).form == Form::LogNormal
     }
 
     /// Location on the scale of the population, and the factor of the coordinate, from natural values.
-    fn frame(&self, natural: &[f64]) -> (f64, f64) {
-        let location = self.population.linear(natural[self.population.location]);
-        let scale = natural[self.population.scale] / self.population.typical;
-        (location, scale.powf(1.0 - self.centred))
+    fn frame(&self, member: &Member, natural: &[f64]) -> (f64, f64) {
+        let population = self.of_member(member);
+        let location = population.linear(natural[population.location]);
+        let scale = natural[population.scale] / population.typical;
+        (location, scale.powf(1.0 - member.centred))
     }
 
+    /// Information of the data relative to that of the population.
+    fn determined(&self, member: &Member, natural: &[f64]) -> f64 {
+        member.information * natural[self.of_member(member).scale].powi(2)
+    }
+}
+
+impl Member {
     /// Power of the scale in the Jacobian.
     fn degree(&self, jacobian: Jacobian) -> f64 {
         match jacobian {
             Jacobian::Whole => 1.0 - self.centred,
             Jacobian::Marginal => 1.0,
         }
-    }
-
-    /// Information of the data relative to that of the population.
-    fn determined(&self, natural: &[f64]) -> f64 {
-        self.information * natural[self.population.scale].powi(2)
     }
 }

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use lacuna::data::{JointPrior, Parameter};
+use lacuna::data::{JointPrior, Parameter, Population};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::forward::Numbers;
@@ -25,6 +25,7 @@ mod members;
 mod mode;
 mod of_data;
 mod pace;
+mod pooled;
 mod scales;
 
 pub use conditional::CutValues;
@@ -46,6 +47,11 @@ const BATCH: usize = 30;
 pub trait LogLikelihood: Send + Sync {
     /// Unknowns besides the parameters.
     fn hyperparameters(&self) -> &[Hyperparameter];
+
+    /// Populations of these unknowns, by their places among them. The unknowns of a population are among them too.
+    fn populations(&self) -> &[Population] {
+        &[]
+    }
 
     /// Log-likelihood for each row of `theta` (`points x parameters`) and `hyper` (`points x hyperparameters`).
     fn values(&self, theta: &Matrix, hyper: &Matrix) -> Vec<f64>;
@@ -83,7 +89,7 @@ pub struct Posterior<'a> {
     prior: JointPrior<'a>,
     likelihood: Arc<dyn LogLikelihood + 'a>,
     region: Option<Vec<(f64, f64)>>,
-    members: Members<'a>,
+    members: Members,
     numbers: Numbers,
     pace: Pace,
 }
@@ -92,7 +98,10 @@ impl<'a> Posterior<'a> {
     /// The posterior with the prior of its parameters.
     pub fn new(prior: impl Into<JointPrior<'a>>, likelihood: impl LogLikelihood + 'a) -> Self {
         let prior = prior.into();
-        let members = Members::of(prior.dependence());
+        let parameters = prior.parameters().len();
+        let besides = likelihood.populations().iter().map(|own| own.behind(parameters));
+        let all = prior.dependence().populations.iter().cloned().chain(besides);
+        let members = Members::of(all.collect());
         let numbers = Numbers::OfPoint;
         let (likelihood, pace) = (Arc::new(likelihood), Pace::default());
         Self { prior, likelihood, region: None, members, numbers, pace }
@@ -110,31 +119,8 @@ impl<'a> Posterior<'a> {
         self.likelihood.runs()
     }
 
-    fn with_members(&self, members: Members<'a>) -> Self {
+    fn with_members(&self, members: Members) -> Self {
         Self { members, ..self.with_likelihood(self.likelihood.clone()) }
-    }
-
-    /// The same density in coordinates whose members are centred to these degrees, from 0 to 1 and in the order of
-    /// [`Self::centred`], where the study leaves that to the data. With the information of the data on each member its
-    /// [`Self::mode`] is that with the members integrated out.
-    #[must_use]
-    pub fn with_centred(&self, centred: &[f64], information: &[f64]) -> Self {
-        let mut members = self.members.clone();
-        members.set(centred, information);
-        self.with_members(members)
-    }
-
-    /// The same density in coordinates whose members are standardised, whatever the study says.
-    #[must_use]
-    pub fn standardised(&self) -> Self {
-        let mut members = self.members.clone();
-        members.standardise();
-        self.with_members(members)
-    }
-
-    /// Degree to which the coordinate of each member of a population is centred: population after population.
-    pub fn centred(&self) -> Vec<f64> {
-        self.members.centred()
     }
 
     /// Restricts each parameter to its interval; the density is zero elsewhere.
@@ -176,9 +162,9 @@ impl<'a> Posterior<'a> {
 
     /// Coordinates of natural values.
     pub fn coordinates(&self, natural: &[f64]) -> Vec<f64> {
-        let mut point = self.map_logs(natural, f64::ln);
+        let mut point = natural.to_vec();
         self.members.coordinates(&mut point);
-        point
+        self.map_logs(&point, f64::ln)
     }
 
     fn map_logs(&self, point: &[f64], map: impl Fn(f64) -> f64) -> Vec<f64> {
@@ -198,12 +184,13 @@ impl<'a> Posterior<'a> {
         if !self.is_inside(natural) {
             return f64::NEG_INFINITY;
         }
-        let each = self.priors().zip(natural).enumerate().filter(|(j, _)| self.prior.has_own(*j));
+        let each = self.priors().zip(natural).enumerate().filter(|(j, _)| self.has_own(*j));
         let own: f64 = each.map(|(_, (prior, &x))| prior.log_density(x)).sum();
-        if self.prior.is_independent() || own == f64::NEG_INFINITY {
+        if own == f64::NEG_INFINITY || (self.prior.is_independent() && self.members.is_empty()) {
             return own;
         }
-        own + self.prior.joint(&natural[..self.parameters().len()])
+        let besides: f64 = self.besides().iter().map(|p| p.log_density_of_members(natural)).sum();
+        own + self.prior.joint(&natural[..self.parameters().len()]) + besides
     }
 
     /// Log Jacobian of the coordinates: for logarithms the sum of these coordinates, unless only that of the members is asked.
@@ -273,11 +260,12 @@ impl<'a> Posterior<'a> {
         for (j, ((g, prior), &x)) in
             gradient.iter_mut().zip(self.priors()).zip(&natural).enumerate()
         {
-            if self.prior.has_own(j) {
+            if self.has_own(j) {
                 *g += prior.log_density_derivative(x);
             }
         }
         self.prior.add_joint_gradient(&natural[..d], &mut gradient);
+        self.besides().iter().for_each(|own| own.add_gradient(&natural, &mut gradient));
         self.members.pull_back(&natural, of_members(jacobian), &mut gradient);
         for (i, hyper) in self.hyperparameters().iter().enumerate().filter(|(_, h)| h.log) {
             debug_assert!(hyper.log);
@@ -338,6 +326,7 @@ impl<'a> Posterior<'a> {
             };
             let rest = self.priors().enumerate().skip(natural.len());
             natural.extend(rest.map(|(j, p)| self.draw(j, p, &mut rng)));
+            self.besides().iter().for_each(|own| own.draw_members(&mut natural, &mut rng));
             self.coordinates(&natural)
         };
         Matrix::from_rows(d, (0..count).map(draw))

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use lacuna::data::Population;
 use lacuna::plugin::discrepancy::Compressed;
 use lacuna::plugin::effect::{Placed, with_tangents};
 use lacuna::plugin::forward::{Linear, Numbers};
@@ -22,6 +23,7 @@ pub struct OfData<'a> {
     likelihood: &'a dyn Likelihood,
     reduced: Option<(&'a dyn Linear, Box<dyn Compressed>)>,
     hyper: Vec<Hyperparameter>,
+    populations: Vec<Population>,
 }
 
 impl<'a> OfData<'a> {
@@ -44,7 +46,14 @@ impl<'a> OfData<'a> {
         } else {
             None
         };
-        Self { forward, effects: placed, likelihood, reduced, hyper }
+        Self { forward, effects: placed, likelihood, reduced, hyper, populations: Vec::new() }
+    }
+
+    /// The same likelihood where some of its unknowns are members of populations, found by `find` among all of them.
+    #[must_use]
+    pub fn pooled(mut self, find: impl FnOnce(&mut [Hyperparameter]) -> Vec<Population>) -> Self {
+        self.populations = find(&mut self.hyper);
+        self
     }
 
     /// Response at natural values: that of the forward map with the effects applied; and the discrepancy's own
@@ -131,6 +140,10 @@ impl<'a> OfData<'a> {
 impl<'a> LogLikelihood for OfData<'a> {
     fn hyperparameters(&self) -> &[Hyperparameter] {
         &self.hyper
+    }
+
+    fn populations(&self) -> &[Population] {
+        &self.populations
     }
 
     fn values(&self, theta: &Matrix, hyper: &Matrix) -> Vec<f64> {

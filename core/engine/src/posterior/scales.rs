@@ -25,9 +25,11 @@ impl Posterior<'_> {
             .iter()
             .map(|h| if h.log { CoordinateScale::Logarithmic } else { CoordinateScale::Natural });
         let mut scales: Vec<CoordinateScale> = parameters.chain(hyper).collect();
-        for (place, population) in self.members.places() {
+        for population in self.populations() {
             scales[population.scale] = CoordinateScale::Logarithmic;
-            scales[place] = CoordinateScale::OfPopulation;
+            for &place in &population.members {
+                scales[place] = CoordinateScale::OfPopulation;
+            }
         }
         scales
     }

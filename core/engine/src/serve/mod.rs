@@ -196,7 +196,7 @@ fn of_run<R>(
         return Ok(act(&all));
     };
     // With populations the log density of the members themselves has no maximum, and no coordinates are those of others.
-    if !study.dependence.populations.is_empty() {
+    if study.has_populations() {
         return Ok(act(&all));
     }
     let parts = Parts::of(study, measured, problem)?;

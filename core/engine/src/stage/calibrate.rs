@@ -26,7 +26,7 @@ use super::best_fit;
 use super::read::Measured;
 use crate::posterior::{Joint, OfData, Posterior};
 use crate::stage::inverse_problem::{InverseProblem, Trial};
-use crate::study::Study;
+use crate::study::{Study, hierarchy};
 
 use cut::sample_cut;
 use sample::{Asked, sample};
@@ -158,11 +158,15 @@ impl Parts {
         let layouts = &study.layouts;
         let mut likelihoods: Vec<Box<dyn Likelihood>> =
             (0..layouts.blocks.len()).map(block).collect::<Result<_, _>>()?;
-        let likelihood = match likelihoods.len() {
-            1 => likelihoods.remove(0),
-            _ => Box::new(Joint::new(layouts, likelihoods)),
-        };
-        Ok(Self { likelihood })
+        let pools = study.pools();
+        if likelihoods.len() == 1 && pools.is_empty() {
+            return Ok(Self { likelihood: likelihoods.remove(0) });
+        }
+        let joint = Joint::new(layouts, likelihoods);
+        let effects = study.placed_effects().into_iter().flat_map(|own| own.hyperparameters());
+        let all: Vec<_> = effects.chain(joint.hyperparameters().iter().cloned()).collect();
+        let besides = hierarchy::unknowns(&pools, &all)?;
+        Ok(Self { likelihood: Box::new(joint.with_besides(besides)) })
     }
 
     /// The likelihood of all blocks.
@@ -176,7 +180,8 @@ impl Parts {
         study: &'a Study,
         problem: &InverseProblem<'a>,
     ) -> Posterior<'a> {
-        let likelihood = OfData::new(problem.forward(), study.placed_effects(), self.likelihood());
+        let likelihood = OfData::new(problem.forward(), study.placed_effects(), self.likelihood())
+            .pooled(|all| hierarchy::populations(&study.pools(), all));
         Posterior::new(study.prior(), likelihood).within(problem.region().map(<[_]>::to_vec))
     }
 }

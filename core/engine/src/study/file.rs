@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 pub use super::dependence::Prior;
 pub use super::derived::DerivedSection;
 pub use super::fidelity::{LowFidelitySection, NumericalErrorSection};
-pub use super::hierarchy::{CoordinatesKey, PopulationKeys};
+pub use super::hierarchy::{CoordinatesKey, PopulationKeys, ScatterKeys};
 pub use super::noise::{InstrumentNoise, NoiseSection};
 pub use super::scenario::{FunctionSection, ScenarioSection};
 pub use lacuna::text::quantity::Quantity;
@@ -330,11 +330,17 @@ pub struct DiscrepancyKeys {
     /// covariance of the mean curve, estimated from the replicates. `false` treats all points as independent, which
     /// makes the posterior too narrow if they are not.
     pub replicate_error: bool,
+    /// Populations of unknowns that the discrepancy has by group: `{ variance = { log_normal = { sd = { half_normal = 1 } } } }`.
+    /// The values of the groups are then draws of one distribution, whose median has the prior of `variance`, so that groups with
+    /// few data learn from the others. All groups of an unknown are members of one population. Default: the groups are
+    /// independent.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub population: BTreeMap<String, ScatterKeys>,
 }
 
 impl Default for DiscrepancyKeys {
     fn default() -> Self {
-        Self { emulator_error: true, replicate_error: true }
+        Self { emulator_error: true, replicate_error: true, population: BTreeMap::new() }
     }
 }
 
@@ -352,10 +358,15 @@ pub struct EffectKeys {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub on: On,
     /// Label of the scenarios by which the effect has unknowns of its own, such as `target`: they are called
-    /// `damping[T24].rate`, and are independent of each other. `"scenario"` makes each scenario a group. Default: the same
-    /// unknowns everywhere.
+    /// `damping[T24].rate`, and are independent of each other unless they have a `population`. `"scenario"` makes each scenario
+    /// a group. Default: the same unknowns everywhere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub by: Option<String>,
+    /// Populations of the effect's unknowns: `{ rate = { log_normal = { sd = { half_normal = 0.5 } } } }`. The values of the groups
+    /// are then draws of one distribution, whose mean, median or location has the prior of `rate`. Default: the groups are
+    /// independent.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub population: BTreeMap<String, ScatterKeys>,
 }
 
 /// Checks performed after the calibration.

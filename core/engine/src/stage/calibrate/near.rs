@@ -57,8 +57,8 @@ pub(super) fn around(
 ) -> Result<Matrix, Stop> {
     let standardised = posterior.standardised();
     let best = standardised.coordinates(&posterior.natural(best));
-    let populations = &posterior.prior().dependence().populations;
-    let scales: Vec<usize> = populations.iter().map(|population| population.scale).collect();
+    let scales: Vec<usize> =
+        posterior.populations().iter().map(|population| population.scale).collect();
     let mut bounds = standardised.bounds();
     for &j in &scales {
         let (low, high) = bounds[j];

@@ -2,6 +2,7 @@
 //! populations.
 
 use lacuna::data::{Draws, Form};
+use lacuna::math::distribution::Distribution;
 use lacuna::math::moments;
 use lacuna::plugin::Target;
 use lacuna::run::Stop;
@@ -68,15 +69,14 @@ const DRAWS: usize = 2000;
 /// The posterior in coordinates whose members are centred to the degree to which the data determine them, and its maxima in
 /// place of those of the standardised members; `None` without populations.
 pub(super) fn adapted<'a>(
-    study: &Study,
     posterior: &Posterior<'a>,
     maxima: &mut Vec<Optimum>,
 ) -> Result<Option<Posterior<'a>>, Stop> {
-    if study.dependence.populations.is_empty() {
+    if posterior.populations().is_empty() {
         return Ok(None);
     }
     // The standardised members are largest at a large scale, where each has the value of its own data.
-    let information = look(study, posterior, &posterior.natural(&maxima[0].point)).1;
+    let information = look(posterior, &posterior.natural(&maxima[0].point)).1;
     let marginal = posterior.with_centred(&posterior.centred(), &information);
     let starts = Matrix::from_rows(
         posterior.dimension(),
@@ -86,7 +86,7 @@ pub(super) fn adapted<'a>(
     let Some(best) = maxima.first() else {
         return Err(Stop::new("no maximum of the posterior density was found"));
     };
-    let centred = look(study, &marginal, &marginal.natural(&best.point)).0;
+    let centred = look(&marginal, &marginal.natural(&best.point)).0;
     let adapted = marginal.with_centred(&centred, &information);
     for maximum in maxima {
         maximum.point = adapted.coordinates(&marginal.natural(&maximum.point));
@@ -96,9 +96,9 @@ pub(super) fn adapted<'a>(
 
 /// Degree to which the data determine each member at natural values, and the precision of what they say of it, in the order
 /// of the posterior.
-fn look(study: &Study, posterior: &Posterior<'_>, natural: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let together = posterior.information(natural, &groups(study));
-    let members = study.dependence.populations.iter().flat_map(|population| {
+fn look(posterior: &Posterior<'_>, natural: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let together = posterior.information(natural);
+    let members = posterior.populations().iter().flat_map(|population| {
         population.members.iter().map(move |&place| (place, natural[population.scale]))
     });
     let degree = |place: usize| {
@@ -111,12 +111,6 @@ fn look(study: &Study, posterior: &Posterior<'_>, natural: &[f64]) -> (Vec<f64>,
             (degree, degree / (1.0 - degree) / (scale * scale))
         })
         .unzip()
-}
-
-/// Name of the group of each parameter.
-fn groups(study: &Study) -> Vec<Option<String>> {
-    let of = |member: &crate::study::hierarchy::Member| format!("{}={}", member.by, member.group);
-    study.unknowns.iter().map(|unknown| unknown.member.as_ref().map(of)).collect()
 }
 
 fn pooling_of(together: &[Together], place: usize, natural: &[f64]) -> Option<f64> {
@@ -132,12 +126,12 @@ pub(super) fn outcomes(
     posterior: &Posterior<'_>,
     draws: &Draws,
 ) -> Vec<PopulationOutcome> {
-    if study.dependence.populations.is_empty() || draws.is_empty() {
+    if posterior.populations().is_empty() || draws.is_empty() {
         return Vec::new();
     }
     let d = draws.dimension();
     let mean: Vec<f64> = (0..d).map(|j| moments::mean(&draws.pooled(j))).collect();
-    let together = posterior.information(&mean, &groups(study));
+    let together = posterior.information(&mean);
     let all: Vec<&[f64]> = draws.values.chunks_exact(d).collect();
     let every = all.len().div_ceil(DRAWS);
     let thinned: Vec<&[f64]> = all.iter().step_by(every).copied().collect();
@@ -145,22 +139,24 @@ pub(super) fn outcomes(
     let mut next = 0;
     let random = stream(study, "new-member");
     let mut outcomes = Vec::new();
-    for population in &study.dependence.populations {
+    let priors: Vec<&Distribution> = posterior.priors().collect();
+    for population in posterior.populations() {
         let member = |(k, &place): (usize, &usize)| {
             let each = thinned.iter().filter_map(|point| pooling_of(&together, place, point));
-            let member = study.unknowns[place].member.as_ref();
-            let mut own = member.into_iter().flat_map(|m| &m.scenarios);
+            // Unknowns besides the parameters belong to groups that were measured.
+            let member = study.unknowns.get(place).and_then(|unknown| unknown.member.as_ref());
+            let is_measured = |&s: &usize| !study.scenarios[s].unmeasured;
             MemberOutcome {
-                name: study.parameters[place].name.clone(),
+                name: posterior.name(place).to_owned(),
                 pooling: moments::mean(&each.collect::<Vec<_>>()),
                 centred: centred[next + k],
-                measured: own.any(|&s| !study.scenarios[s].unmeasured),
+                measured: member.is_none_or(|own| own.scenarios.iter().any(is_measured)),
             }
         };
         let members: Vec<MemberOutcome> =
             population.members.iter().enumerate().map(member).collect();
         next += members.len();
-        let prior = &study.parameters[population.scale].prior;
+        let prior = priors[population.scale];
         let scale = moments::sorted(&draws.pooled(population.scale));
         let range = moments::quantile(&scale, 0.975) - moments::quantile(&scale, 0.025);
         let stream = random.named(&population.name);
@@ -171,8 +167,8 @@ pub(super) fn outcomes(
         outcomes.push(PopulationOutcome {
             parameter: population.name.clone(),
             form: population.form,
-            location: study.parameters[population.location].name.clone(),
-            scale: study.parameters[population.scale].name.clone(),
+            location: posterior.name(population.location).to_owned(),
+            scale: posterior.name(population.scale).to_owned(),
             members,
             new_member: summary(&all.iter().enumerate().map(further).collect::<Vec<_>>()),
             scale_range: range / (prior.quantile(0.975) - prior.quantile(0.025)),

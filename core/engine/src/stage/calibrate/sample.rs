@@ -53,7 +53,7 @@ pub(super) fn sample(
         sampling::broken(posterior)?;
         maxima?
     };
-    let adapted = population::adapted(study, posterior, &mut maxima)?;
+    let adapted = population::adapted(posterior, &mut maxima)?;
     let posterior = adapted.as_ref().unwrap_or(posterior);
     let target: &dyn Target = match &estimated {
         Some(estimated) => estimated,

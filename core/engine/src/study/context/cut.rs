@@ -56,7 +56,7 @@ pub(super) fn check(study: &Study, complaints: &mut Complaints<'_>) {
     let free_groups = dependence.groups.iter().any(|group| !cut.contains(&group.members[0]));
     let others = [
         (!dependence.constraints.is_empty(), "a `[[constraint]]`"),
-        (!dependence.populations.is_empty(), "populations of parameters"),
+        (study.has_populations(), "populations"),
         (free_groups, "parameters that depend on each other and are not cut"),
         (!study.reliability.is_empty(), "`[[reliability]]`"),
     ];

@@ -7,6 +7,7 @@ use lacuna::text::nearest::{nearest, one_of};
 use lacuna::text::{Complaints, Node, Problems};
 
 use crate::study::components::effect_name;
+use crate::study::hierarchy::of_effect;
 use crate::study::resolve::Study;
 
 /// Reports names that are taken, and places that the response does not have.
@@ -22,6 +23,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
                 .help(format!("give one of them a name of its own, such as `name = \"{name}_2\"`"));
         }
         places(study, "on", &section.common.on, &mut complaints);
+        of_effect(study, section, &mut complaints);
         if let Some(by) = &section.common.by {
             groups(study, by, &mut complaints);
             if !section.built.plugin.switches().is_empty() {

@@ -44,10 +44,10 @@ pub(super) fn check(study: &Study, complaints: &mut Complaints<'_>) {
             .say("the calibration of a stochastic model has no search that begins at stated values")
             .help("take `[[start]]` out");
     }
-    if !study.dependence.populations.is_empty() {
+    if study.has_populations() {
         complaints
             .at("model.seed")
-            .say("a stochastic model cannot be calibrated with populations of parameters")
+            .say("a stochastic model cannot be calibrated with populations")
             .help("give each group a prior of its own: `by` without `population`");
     }
 }

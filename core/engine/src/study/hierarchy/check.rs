@@ -1,8 +1,12 @@
 //! Combinations with parameters by group that a study cannot have.
 
+use lacuna::math::distribution::Distribution;
+use lacuna::plugin::Effect;
+use lacuna::plugin::registry::Section;
+use lacuna::text::nearest::{nearest, one_of};
 use lacuna::text::{Complaints, Node, Problems};
 
-use crate::study::file::ParameterSection;
+use crate::study::file::{EffectKeys, ParameterSection, ScatterKeys};
 use crate::study::plain::Study;
 
 /// Reports keys of a parameter that contradict each other.
@@ -55,15 +59,9 @@ pub(in crate::study) fn keys(
             .say("missing key `design`")
             .expected("the range in which the runs vary the parameter, such as `design = { uniform = [0, 1] }`");
     }
-    let [(place, location), (spread, scale)] = population.unknowns();
     let under = format!("{path}.population.{}", population.name());
-    if scale.support().0 < 0.0 {
-        complaints
-            .at(&format!("{under}.{spread}"))
-            .say("the scatter between groups is not below zero")
-            .expected("a prior of positive numbers, such as `{ half_normal = 1 }`")
-            .found(scale);
-    }
+    let [(place, location), (spread, scale)] = population.unknowns();
+    positive(&format!("{under}.{spread}"), scale, complaints);
     if population.name() == "log_normal" && location.support().0 < 0.0 {
         complaints
             .at(&format!("{under}.{place}"))
@@ -73,8 +71,63 @@ pub(in crate::study) fn keys(
     }
 }
 
+/// Reports a prior of a scatter that allows negative numbers.
+fn positive(path: &str, scale: &Distribution, complaints: &mut Complaints<'_>) {
+    if scale.support().0 < 0.0 {
+        complaints
+            .at(path)
+            .say("the scatter between groups is not below zero")
+            .expected("a prior of positive numbers, such as `{ half_normal = 1 }`")
+            .found(scale);
+    }
+}
+
+/// Reports the prior of a scatter, written under the key `path`, that allows negative numbers.
+fn scatter(path: &str, keys: &ScatterKeys, complaints: &mut Complaints<'_>) {
+    let (spread, scale) = keys.scale();
+    positive(&format!("{path}.{}.{spread}", keys.name()), scale, complaints);
+}
+
+/// Reports populations of the discrepancy's unknowns that cannot be.
+fn of_discrepancy(study: &Study, complaints: &mut Complaints<'_>) {
+    for (name, keys) in study.discrepancy.iter().flat_map(|d| &d.common.population) {
+        scatter(&format!("discrepancy.population.{name}"), keys, complaints);
+    }
+}
+
+/// Reports populations of an effect's unknowns that it does not have, and those without groups.
+pub(in crate::study) fn of_effect(
+    study: &Study,
+    section: &Section<dyn Effect, EffectKeys>,
+    complaints: &mut Complaints<'_>,
+) {
+    let EffectKeys { by, population, .. } = &section.common;
+    let unknowns = section.built.plugin.parameters(&study.layouts.blocks[0]);
+    let known: Vec<&str> = unknowns.iter().map(|own| own.name.as_str()).collect();
+    for (name, keys) in population {
+        let path = format!("population.{name}");
+        if by.is_none() {
+            complaints
+                .at(&path)
+                .say("a population has groups as members, and the effect has none")
+                .help(
+                    "add `by`: the label of the scenarios that makes the groups, or \"scenario\"",
+                );
+        }
+        if !known.contains(&name.as_str()) {
+            let problem = complaints.at(&path).say(format!("the effect has no unknown `{name}`"));
+            problem.expected(one_of(known.iter().copied()));
+            if let Some(near) = nearest(name, known.iter().copied()) {
+                problem.help(format!("did you mean `{near}`?"));
+            }
+        }
+        scatter(&path, keys, complaints);
+    }
+}
+
 /// Reports sections that do not know parameters by group yet.
 pub(in crate::study) fn check(study: &Study, complaints: &mut Complaints<'_>) {
+    of_discrepancy(study, complaints);
     if study.hierarchy.trained.is_some() {
         let refine = study.surrogate.as_ref().is_some_and(|s| s.common.refine.is_some());
         let refused =

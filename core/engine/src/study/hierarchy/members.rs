@@ -3,16 +3,12 @@
 use lacuna::data::layouts::SCENARIO;
 use lacuna::data::{Form, Parameter, Population, Scenario, Unit};
 use lacuna::math::distribution::Distribution;
-use lacuna::math::random::{Stream, normal};
 use lacuna::text::nearest::{nearest, one_of};
 use lacuna::text::{Complaints, Node, Problems};
 
 use super::{Member, PopulationKeys};
 use crate::study::file::{ParameterSection, Prior};
 use crate::study::unknowns::{Unknown, UnknownKind};
-
-/// Number of draws from which the distribution of a member by itself is described.
-const DRAWS: usize = 20_000;
 
 /// Adds the parameters of a section with `by`; `prior` is that of members without a population.
 pub(in crate::study) fn members(
@@ -25,12 +21,13 @@ pub(in crate::study) fn members(
 ) -> Option<Population> {
     let path = format!("parameter.{}", section.name);
     let groups = groups(section, scenarios, &path, root, problems)?;
-    let marginal = section.population.as_ref().map(marginal);
+    let marginal = section.population.as_ref().map(PopulationKeys::marginal);
     let own = marginal.as_ref().or(prior)?;
     let design = section.design.as_ref().unwrap_or(own);
     let name = section.name.as_str();
     let symbol = section.symbol.as_deref().unwrap_or(name);
     let first = parameters.len();
+    let names = groups.iter().map(|own| format!("{}={}", own.by, own.group)).collect();
     for member in groups {
         parameters.push(Parameter {
             name: format!("{name}[{}]", member.group),
@@ -77,6 +74,7 @@ pub(in crate::study) fn members(
         name: name.to_owned(),
         form,
         members,
+        groups: names,
         location: places[0],
         scale: places[1],
         typical,
@@ -130,25 +128,4 @@ fn groups(
         }
     }
     Some(groups)
-}
-
-/// The distribution of a member by itself: that of the population over the priors of its unknowns, by quantiles of draws. It
-/// describes the member in tables and figures; the posterior uses the joint density.
-fn marginal(population: &PopulationKeys) -> Distribution {
-    let form = population.form();
-    let [(_, location), (_, scale)] = population.unknowns();
-    let stream = Stream::root(0).named("population");
-    let draw = |i: usize| {
-        let mut rng = stream.at(i as u64).generator();
-        let (m, s) = (location.sample(&mut rng), scale.sample(&mut rng));
-        let z = match form {
-            Form::StudentT(dof) => Distribution::StudentT([dof, 0.0, 1.0]).sample(&mut rng),
-            Form::Normal | Form::LogNormal => normal(&mut rng),
-        };
-        if form == Form::LogNormal { m * (s * z).exp() } else { m + s * z }
-    };
-    let draws: Vec<f64> = (0..DRAWS).map(draw).collect();
-    let low = if form == Form::LogNormal { 0.0 } else { f64::NEG_INFINITY };
-    let law = Distribution::of_draws(&draws, (low, f64::INFINITY), DRAWS as f64);
-    law.unwrap_or_else(|| location.clone())
 }

@@ -4,6 +4,7 @@
 //! keys     the keys of [[parameter]] as written
 //! groups   scenarios from a column of the measurements
 //! members  the parameters and unknowns that they stand for, and the distribution of a member by itself
+//! pools    populations of unknowns of the discrepancy and of effects
 //! trained  the study whose runs train the emulator: one value of each parameter, conditions that differ once
 //! check    combinations that are refused
 //! ```
@@ -12,14 +13,16 @@ mod check;
 mod groups;
 mod keys;
 mod members;
+mod pools;
 mod trained;
 
 use super::file::ParameterSection;
 
-pub(super) use check::{check, of_sections};
+pub(super) use check::{check, of_effect, of_sections};
 pub(super) use groups::groups_as_scenarios;
-pub use keys::{CoordinatesKey, PopulationKeys};
+pub use keys::{CoordinatesKey, PopulationKeys, ScatterKeys};
 pub(super) use members::members;
+pub use pools::{Pool, populations, unknowns};
 pub(super) use trained::trained;
 pub use trained::{Part, Trained};
 
