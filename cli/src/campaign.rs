@@ -11,7 +11,7 @@ use lacuna_run::RunDirectory;
 
 use crate::interrupt::{self, Next};
 use crate::study::kept_study_for;
-use crate::{misuse, print, progress};
+use crate::{misuse, print, progress, show};
 
 /// Operation on the runs.
 #[derive(clap::Subcommand)]
@@ -81,7 +81,7 @@ fn status(folder: &Path, all: bool, json: bool) -> anyhow::Result<()> {
             .map_err(|error| Stop::new(format!("the table cannot be written: {error}")))?;
         print(&text);
     } else {
-        print(campaign::text(&status, all).trim_end());
+        show(campaign::text(&status, all).trim_end());
     }
     Ok(())
 }

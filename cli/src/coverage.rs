@@ -9,7 +9,7 @@ use lacuna_run::{RunDirectory, Stage};
 
 use crate::interrupt::{self, Next};
 use crate::study::{Settings, folder, load};
-use crate::{print, progress};
+use crate::{print, progress, show};
 
 /// Options of the count.
 #[derive(clap::Args)]
@@ -64,7 +64,7 @@ pub fn coverage(
     };
     let found = coverage::coverage(&study, &asked, &mut run, &*progress::observer())?;
     print("");
-    print(coverage_text(&found).trim_end());
+    show(coverage_text(&found).trim_end());
     print("");
     print(&format!(
         "page: {}",

@@ -15,7 +15,7 @@ use lacuna_run::RunDirectory;
 
 use crate::interrupt::{self, Next};
 use crate::study::{Settings, Trust, folder, load, print_summary, report_of};
-use crate::{misuse, print, progress};
+use crate::{misuse, print, progress, show};
 
 /// Treatment of the effects that were found.
 #[derive(clap::Args)]
@@ -50,7 +50,7 @@ pub fn gap(
     print("");
     print(&format!("before anything is added: {}", findings.assessment.line()));
     print("");
-    print(gap_text(&findings).trim_end());
+    show(gap_text(&findings).trim_end());
     print("");
     let wanted = wanted(&gap.result, manner)?;
     if wanted.additions.is_empty() {
@@ -67,7 +67,7 @@ pub fn gap(
     print("");
     print_summary(&with);
     print("");
-    print(gap_text(&findings).trim_end());
+    show(gap_text(&findings).trim_end());
     print("");
     print(&format!("study with the added effects: {}", added.study.display()));
     report_of(&added.run);
@@ -90,7 +90,7 @@ pub fn power(
         if quick { (PowerDesign::quick(), Some(QUICK)) } else { (PowerDesign::thorough(), None) };
     let rates = pipeline::power(&study, &design, simulations, &mut run, &*progress::observer())?;
     print("");
-    print(power_text(&rates).trim_end());
+    show(power_text(&rates).trim_end());
     Ok(())
 }
 
@@ -131,7 +131,7 @@ pub fn next(
     let stop = || Stop::new("the information of further data has no finite value");
     let text = next_text(&findings, by.map(By::wanted)).ok_or_else(stop)??;
     print("");
-    print(text.trim_end());
+    show(text.trim_end());
     Ok(())
 }
 

@@ -7,6 +7,7 @@ mod events;
 mod gap;
 mod inspect;
 mod interrupt;
+mod layout;
 mod manual;
 mod new;
 mod plugins;
@@ -23,7 +24,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
-use terminal::print;
+use terminal::{print, show};
 // The plugins register themselves; naming their crate makes the linker include it.
 use lacuna_plugins as _;
 

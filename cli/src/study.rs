@@ -18,7 +18,7 @@ use lacuna_run::RunDirectory;
 use crate::interrupt::{self, Next};
 use crate::plugins::Libraries;
 use crate::terminal::{clean, print_styled, tell};
-use crate::{Untrusted, events, misuse, plugins, print, progress};
+use crate::{Untrusted, events, misuse, plugins, print, progress, show};
 
 /// Keys set on the command line.
 #[derive(Default, clap::Args)]
@@ -166,7 +166,7 @@ pub fn compare(folders: &[PathBuf], json: bool) -> anyhow::Result<()> {
             .map_err(|error| Stop::new(format!("the comparison cannot be written: {error}")))?;
         print(&text);
     } else {
-        print(&compare::text(&comparison));
+        show(&compare::text(&comparison));
     }
     Ok(())
 }
@@ -243,7 +243,7 @@ pub fn print_summary(findings: &Findings) {
     } else {
         print_styled(&coloured(&clean(first), findings.assessment.level));
     }
-    print(rest);
+    show(rest);
 }
 
 fn coloured(line: &str, level: Level) -> String {

@@ -1,10 +1,14 @@
 //! Standard output and standard error: text of studies and data cannot command the terminal, a closed pipe ends nothing, and
 //! output that cannot be written is an error.
 
-use std::io::{ErrorKind, Write as _};
+use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::events;
+use crate::layout::fitted;
+
+/// Smallest number of columns into which text is fitted.
+const NARROWEST: usize = 40;
 
 /// True once standard output could not be written for another reason than a closed pipe.
 static FAILED: AtomicBool = AtomicBool::new(false);
@@ -12,6 +16,24 @@ static FAILED: AtomicBool = AtomicBool::new(false);
 /// Prints a line to standard output.
 pub fn print(text: &str) {
     if events::are_on() { events::text(text) } else { print_styled(&clean(text)) }
+}
+
+/// Prints sentences and tables so that they fit into a terminal; what is written into a file or a pipe has long lines.
+pub fn show(text: &str) {
+    match columns().filter(|_| !events::are_on()) {
+        Some(width) => print_styled(&fitted(&clean(text), width)),
+        None => print(text),
+    }
+}
+
+/// Number of columns of the terminal on standard output; `None` if it is none.
+fn columns() -> Option<usize> {
+    if !std::io::stdout().is_terminal() {
+        return None;
+    }
+    let stated = std::env::var("COLUMNS").ok().and_then(|text| text.parse::<usize>().ok());
+    let size = || console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
+    stated.filter(|&width| width > 0).or_else(size).map(|width| width.max(NARROWEST))
 }
 
 /// Prints a line that has escape sequences of its own.

@@ -221,7 +221,7 @@ mod tests {
     #[test]
     fn keys_of_the_engine_stay_when_a_plugin_changes() {
         assert_eq!(common_keys("sampler"), ["burn_in", "start", "stop", "imputations"]);
-        assert_eq!(common_keys("effect"), ["name", "on", "by"]);
+        assert_eq!(common_keys("effect"), ["name", "on", "by", "population"]);
         assert_eq!(common_keys("executor"), [""; 0]);
         assert_eq!(common_keys("validate"), [""; 0]);
     }
