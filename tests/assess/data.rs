@@ -1,7 +1,9 @@
 //! Data that are not what they are taken for, and a model that cannot have produced them.
 
+use std::fmt::Write as _;
 use std::fs;
 
+use generator::noise::Source;
 use lacuna_engine::assess::{Level, Severity};
 use tempfile::TempDir;
 
@@ -34,6 +36,38 @@ fn data_in_another_unit_are_called_that() {
     let assessment = assess(folder.path(), &[]);
     let finding = found(&assessment, "data_outside_runs", Severity::Failure);
     assert!(finding.message.contains("1000 times too small"), "{}", finding.message);
+}
+
+/// A single record of a decay whose rate is known to one part in a thousand: all runs are within a hundredth of the noise of each
+/// other, and nearly every value lies outside of their range. The record is only told from a shifted one by its scatter.
+#[test]
+fn noise_about_a_model_that_is_known_is_not_outside_of_the_runs() {
+    const STUDY: &str = r#"
+study = { title = "a known decay", seed = 5 }
+parameter = [{ name = "rate", unit = "1/s", prior = { normal = [0.5, 5e-4] } }]
+response = { name = "y", axes = { t = { measured = true, unit = "s" } } }
+model = { use = "equations", observe = "exp(-rate * t)" }
+measurements = { use = "csv", path = "y.csv" }
+discrepancy = { use = "gaussian", variance = { half_normal = 1.0 } }
+sampler = { use = "affine_invariant_ensemble" }
+"#;
+    let assessed = |shift: f64, stated: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut random = Source::new(12);
+        let mut table = "t [s],y\n".to_owned();
+        for i in 0..60 {
+            let t = f64::from(i) / 10.0;
+            writeln!(table, "{t},{}", (-0.5 * t).exp() + shift + 0.1 * random.normal()).unwrap();
+        }
+        fs::write(folder.path().join("y.csv"), table).unwrap();
+        fs::write(folder.path().join("study.toml"), STUDY).unwrap();
+        assess(folder.path(), stated)
+    };
+    for stated in [&[][..], &["measurements.noise.sd=0.1"]] {
+        let plain = assessed(0.0, stated);
+        assert_eq!(plain.of_code("data_outside_runs").count(), 0, "{:#?}", plain.findings);
+        found(&assessed(0.5, stated), "data_outside_runs", Severity::Failure);
+    }
 }
 
 /// A slow oscillation that the model cannot produce, larger than the noise and the same in all replicates.

@@ -90,7 +90,7 @@ impl Stage {
             Self::Validate => (6, "validate", OnVersion(6)),
             Self::Quantities => (6, "quantities", OnVersion(3)),
             Self::Reliability => (6, "reliability", OnVersion(3)),
-            Self::Assess => (6, "assess", OnVersion(9)),
+            Self::Assess => (6, "assess", OnVersion(10)),
             Self::Gap => (7, "gap", OnVersion(7)),
             Self::Show => (7, "show", OnVersion(1)),
             Self::Power => (7, "power", OnVersion(2)),

@@ -28,7 +28,8 @@ pub fn rules() -> Vec<Rule> {
             code: CODE,
             looks_at: format!(
                 "by curve, the fraction of the replicates' means outside the range of all runs (without runs: of \
-                 the model at prior draws) by more than {NOISES} standard errors; the root mean square of the data \
+                 the model at prior draws) by more than {NOISES} standard errors, without replicates of the stated noise or of the \
+                 scatter along the curve; the root mean square of the data \
                  relative to that of every run"
             ),
             threshold: format!(

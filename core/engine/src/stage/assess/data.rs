@@ -3,7 +3,9 @@
 use std::borrow::Cow;
 
 use lacuna::data::layout::Group;
+use lacuna::data::measurements::Summary;
 use lacuna::data::{Measurements, Observations};
+use lacuna::math::moments::{self, mean};
 use lacuna_linalg::Matrix;
 
 use crate::assess::Finding;
@@ -77,12 +79,14 @@ fn beside_runs(study: &Study, problem: &InverseProblem<'_>, data: &Observations)
         groups.into_iter().map(|group| (group.name, group.indices)).collect()
     };
     let summaries = data.summaries();
+    let stated = super::stated_noise(study);
     found.extend(curves.into_iter().filter_map(|(name, indices)| {
         let measured: Vec<usize> =
             indices.into_iter().filter(|&i| summaries[i].count > 0).collect();
+        let noise = noise(&summaries, &measured, &stated);
         let error = |i: usize| {
             let s = &summaries[i];
-            s.sd().map_or(0.0, |sd| sd / (s.count as f64).sqrt())
+            s.sd().unwrap_or(0.0).max(noise) / (s.count as f64).sqrt()
         };
         let range = |&i: &usize| {
             let column = answers().map(|row| row[i]);
@@ -100,6 +104,31 @@ fn beside_runs(study: &Study, problem: &InverseProblem<'_>, data: &Observations)
         })
     }));
     found
+}
+
+/// Standard deviation of a single value of a curve: that between replicates, pooled over the curve; without replicates as the
+/// study states it, or from the curve itself.
+fn noise(summaries: &[Summary], measured: &[usize], stated: &[Option<f64>]) -> f64 {
+    let root_mean = |variances: Vec<f64>| (!variances.is_empty()).then(|| mean(&variances).sqrt());
+    let between = measured.iter().filter_map(|&i| summaries[i].sd()).map(|sd| sd * sd).collect();
+    let stated = || {
+        let all = measured.iter().map(|&i| stated.get(i).copied().flatten());
+        root_mean(all.map(|sd| sd.map(|sd| sd * sd)).collect::<Option<_>>()?)
+    };
+    let values: Vec<f64> = measured.iter().map(|&i| summaries[i].mean).collect();
+    root_mean(between).or_else(stated).unwrap_or_else(|| roughness(&values))
+}
+
+/// Standard deviation of white noise on a smooth curve, from the median size of its second differences `y₁ - 2 y₂ + y₃`, whose
+/// variance is six times that of the noise; zero for short curves.
+fn roughness(values: &[f64]) -> f64 {
+    /// Ratio of the standard deviation of a normal distribution to the median of its magnitude.
+    const NORMAL: f64 = 1.4826;
+    if values.len() < SHORT {
+        return 0.0;
+    }
+    let bends: Vec<f64> = values.windows(3).map(|y| (y[0] - 2.0 * y[1] + y[2]).abs()).collect();
+    NORMAL * moments::quantile(&moments::sorted(&bends), 0.5) / 6.0_f64.sqrt()
 }
 
 /// Responses at draws from the prior.

@@ -67,9 +67,8 @@ fn form(judged: &Judged<'_>, validated: &Validated) -> Option<Finding> {
 
 /// Root mean square of the noise that the study states; `None` unless it does for every output.
 fn stated_noise(judged: &Judged<'_>) -> Option<f64> {
-    let noise = judged.study.measurements.as_ref()?.common.noise.as_ref()?;
-    let outputs = judged.study.layouts.blocks.iter().flat_map(|block| noise.of(block));
-    let squares: Option<Vec<f64>> = outputs.map(|output| output.sd.map(|sd| sd * sd)).collect();
+    let outputs = super::stated_noise(judged.study).into_iter();
+    let squares: Option<Vec<f64>> = outputs.map(|sd| sd.map(|sd| sd * sd)).collect();
     squares.filter(|squares| !squares.is_empty()).map(|squares| mean(&squares).sqrt())
 }
 

@@ -39,6 +39,15 @@ impl Artifact for Assessment {
     }
 }
 
+/// Noise of a single value of each output as the study states it; empty if it states none.
+fn stated_noise(study: &Study) -> Vec<Option<f64>> {
+    let noise = study.measurements.as_ref().and_then(|section| section.common.noise.as_ref());
+    let outputs = noise.into_iter().flat_map(|noise| {
+        study.layouts.blocks.iter().flat_map(|block| noise.of(block)).collect::<Vec<_>>()
+    });
+    outputs.map(|output| output.sd).collect()
+}
+
 /// Judges the results of the other stages.
 pub fn stage(
     study: &Study,
