@@ -58,6 +58,12 @@ const SCHOOLS: [&str; 8] = ["A", "B", "C", "D", "E", "F", "G", "H"];
 
 /// Rubin's eight schools (Journal of Educational Statistics 6 (1981) 377), whose model is the identity.
 fn schools(more: &str) -> TempDir {
+    let text = fs::read_to_string(quick::root().join("tests/hierarchy/schools.toml")).unwrap();
+    schools_of(&(text + more))
+}
+
+/// The measured scores of the eight schools beside a study.
+fn schools_of(study: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let data = &reference()["data"];
     let mut table = "school,score,sigma\n".to_owned();
@@ -65,8 +71,7 @@ fn schools(more: &str) -> TempDir {
         writeln!(table, "{name},{},{}", data["y"][k], data["sigma"][k]).unwrap();
     }
     fs::write(folder.path().join("schools.csv"), table).unwrap();
-    let text = fs::read_to_string(quick::root().join("tests/hierarchy/schools.toml")).unwrap();
-    fs::write(folder.path().join("study.toml"), text + more).unwrap();
+    fs::write(folder.path().join("study.toml"), study).unwrap();
     folder
 }
 

@@ -38,36 +38,62 @@ fn data_in_another_unit_are_called_that() {
     assert!(finding.message.contains("1000 times too small"), "{}", finding.message);
 }
 
-/// A single record of a decay whose rate is known to one part in a thousand: all runs are within a hundredth of the noise of each
-/// other, and nearly every value lies outside of their range. The record is only told from a shifted one by its scatter.
-#[test]
-fn noise_about_a_model_that_is_known_is_not_outside_of_the_runs() {
-    const STUDY: &str = r#"
-study = { title = "a known decay", seed = 5 }
-parameter = [{ name = "rate", unit = "1/s", prior = { normal = [0.5, 5e-4] } }]
-response = { name = "y", axes = { t = { measured = true, unit = "s" } } }
-model = { use = "equations", observe = "exp(-rate * t)" }
+const KNOWN: &str = r#"
+study = { title = "a known response", seed = 5 }
+parameter = [{ name = "rate", prior = { normal = [0.5, 5e-4] } }]
+response = { name = "y", axes = { t = { measured = true, unit = "1" } } }
+model = { use = "equations", observe = "RESPONSE" }
 measurements = { use = "csv", path = "y.csv" }
 discrepancy = { use = "gaussian", variance = { half_normal = 1.0 } }
 sampler = { use = "affine_invariant_ensemble" }
 "#;
-    let assessed = |shift: f64, stated: &[&str]| {
-        let folder = tempfile::tempdir().unwrap();
-        let mut random = Source::new(12);
-        let mut table = "t [s],y\n".to_owned();
-        for i in 0..60 {
-            let t = f64::from(i) / 10.0;
-            writeln!(table, "{t},{}", (-0.5 * t).exp() + shift + 0.1 * random.normal()).unwrap();
+
+/// Single records of responses that are known to one part in a thousand: all runs are within a hundredth of the noise of each
+/// other, and nearly every value lies outside of their range. A record is told from a shifted one only by its scatter, also where
+/// the response oscillates as fast as it is sampled.
+#[test]
+fn noise_about_a_model_that_is_known_is_not_outside_of_the_runs() {
+    type Response = fn(f64) -> f64;
+    let responses: [(&str, Response); 2] = [
+        ("exp(-rate * t)", |t| (-0.5 * t).exp()),
+        ("2 * rate * cos(30 * t)", |t| (30.0 * t).cos()),
+    ];
+    for (formula, response) in responses {
+        let assessed = |shift: f64, stated: &[&str]| {
+            let folder = tempfile::tempdir().unwrap();
+            let mut random = Source::new(12);
+            let mut table = "t [1],y\n".to_owned();
+            for i in 0..60 {
+                let t = f64::from(i) / 10.0;
+                writeln!(table, "{t},{}", response(t) + shift + 0.1 * random.normal()).unwrap();
+            }
+            fs::write(folder.path().join("y.csv"), table).unwrap();
+            let study = KNOWN.replace("RESPONSE", formula);
+            fs::write(folder.path().join("study.toml"), study).unwrap();
+            assess(folder.path(), stated)
+        };
+        for stated in [&[][..], &["measurements.noise.sd=0.1"]] {
+            let plain = assessed(0.0, stated);
+            assert_eq!(plain.of_code("data_outside_runs").count(), 0, "{:#?}", plain.findings);
+            found(&assessed(0.5, stated), "data_outside_runs", Severity::Failure);
         }
-        fs::write(folder.path().join("y.csv"), table).unwrap();
-        fs::write(folder.path().join("study.toml"), STUDY).unwrap();
-        assess(folder.path(), stated)
-    };
-    for stated in [&[][..], &["measurements.noise.sd=0.1"]] {
-        let plain = assessed(0.0, stated);
-        assert_eq!(plain.of_code("data_outside_runs").count(), 0, "{:#?}", plain.findings);
-        found(&assessed(0.5, stated), "data_outside_runs", Severity::Failure);
     }
+}
+
+/// Four numbers of different size, once each, are no curve whose scatter could hide the wrong unit.
+#[test]
+fn single_numbers_in_another_unit_are_called_that() {
+    let folder = tempfile::tempdir().unwrap();
+    let labels = r#"part = { labels = ["a", "b", "c", "d"] }"#;
+    let formulas = r#"{ a = "2 * rate", b = "20 * rate", c = "200 * rate", d = "2000 * rate" }"#;
+    let study = KNOWN
+        .replace(r#"t = { measured = true, unit = "1" }"#, labels)
+        .replace(r#""RESPONSE""#, formulas);
+    fs::write(folder.path().join("study.toml"), study).unwrap();
+    fs::write(folder.path().join("y.csv"), "part,y\na,1e3\nb,1e4\nc,1e5\nd,1e6\n").unwrap();
+    let assessment = assess(folder.path(), &[]);
+    let finding = found(&assessment, "data_outside_runs", Severity::Failure);
+    assert!(finding.message.contains("1000 times too large"), "{}", finding.message);
 }
 
 /// A slow oscillation that the model cannot produce, larger than the noise and the same in all replicates.

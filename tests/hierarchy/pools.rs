@@ -8,9 +8,8 @@ use std::fs;
 
 use generator::noise::Source;
 use lacuna::math::moments;
-use tempfile::TempDir;
 
-use super::{ERRORS, SCHOOLS, draws, has_the_reference, number, reference, run};
+use super::{ERRORS, draws, has_the_reference, number, run, schools_of};
 use crate::quick;
 
 const SCHOOLS_STUDY: &str = r#"
@@ -52,14 +51,9 @@ target_acceptance = 0.95
 
 #[test]
 fn eight_schools_as_offsets_have_their_published_posterior() {
-    let folder = tempfile::tempdir().unwrap();
-    let data = &reference()["data"];
-    let mut table = "school,score,sigma\n".to_owned();
-    for (k, name) in SCHOOLS.iter().enumerate() {
-        writeln!(table, "{name},{},{}", data["y"][k], data["sigma"][k]).unwrap();
-    }
-    fs::write(folder.path().join("schools.csv"), table).unwrap();
-    let summary = summary(&folder, SCHOOLS_STUDY);
+    let folder = schools_of(SCHOOLS_STUDY);
+    run(folder.path(), &[]);
+    let summary = quick::summary(&folder.path().join("out"));
     has_the_reference(&summary, &|school| format!("offset[{school}].size"), "offset.size");
     let population = &summary["populations"]["offset.size"];
     assert_eq!(population["form"], "normal");
@@ -222,11 +216,4 @@ fn populations_that_cannot_be_are_refused() {
     assert!(alone.contains("not two groups with data") && alone.contains("add `by`"), "{alone}");
     let normal = said(VARIANCES_STUDY.replace("log_normal = {", "normal = {"));
     assert!(normal.contains("above zero") && normal.contains("log_normal"), "{normal}");
-}
-
-fn summary(folder: &TempDir, study: &str) -> serde_json::Value {
-    let (path, out) = (folder.path().join("study.toml"), folder.path().join("out"));
-    fs::write(&path, study).unwrap();
-    quick::run(&path, &[], &out).unwrap_or_else(|stop| panic!("{stop}"));
-    quick::summary(&out)
 }

@@ -83,11 +83,11 @@ fn beside_runs(study: &Study, problem: &InverseProblem<'_>, data: &Observations)
     found.extend(curves.into_iter().filter_map(|(name, indices)| {
         let measured: Vec<usize> =
             indices.into_iter().filter(|&i| summaries[i].count > 0).collect();
-        let noise = noise(&summaries, &measured, &stated);
-        let error = |i: usize| {
-            let s = &summaries[i];
-            s.sd().unwrap_or(0.0).max(noise) / (s.count as f64).sqrt()
-        };
+        let own = |i: usize| summaries[i].sd().or_else(|| stated.get(i).copied().flatten());
+        // Values of different quantities have no common scatter.
+        let common = if short { 0.0 } else { scatter(&summaries, &measured, own, answers()) };
+        let error =
+            |i: usize| own(i).unwrap_or(0.0).max(common) / (summaries[i].count as f64).sqrt();
         let range = |&i: &usize| {
             let column = answers().map(|row| row[i]);
             column.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)))
@@ -106,17 +106,27 @@ fn beside_runs(study: &Study, problem: &InverseProblem<'_>, data: &Observations)
     found
 }
 
-/// Standard deviation of a single value of a curve: that between replicates, pooled over the curve; without replicates as the
-/// study states it, or from the curve itself.
-fn noise(summaries: &[Summary], measured: &[usize], stated: &[Option<f64>]) -> f64 {
-    let root_mean = |variances: Vec<f64>| (!variances.is_empty()).then(|| mean(&variances).sqrt());
-    let between = measured.iter().filter_map(|&i| summaries[i].sd()).map(|sd| sd * sd).collect();
-    let stated = || {
-        let all = measured.iter().map(|&i| stated.get(i).copied().flatten());
-        root_mean(all.map(|sd| sd.map(|sd| sd * sd)).collect::<Option<_>>()?)
-    };
-    let values: Vec<f64> = measured.iter().map(|&i| summaries[i].mean).collect();
-    root_mean(between).or_else(stated).unwrap_or_else(|| roughness(&values))
+/// Standard deviation that the values of a curve have in common: that between replicates, pooled over the curve; zero if the
+/// noise of all values is stated; otherwise that of the curve about the run that is nearest to it, whose oscillations it shares.
+fn scatter<'r>(
+    summaries: &[Summary],
+    measured: &[usize],
+    own: impl Fn(usize) -> Option<f64>,
+    runs: impl Iterator<Item = &'r [f64]>,
+) -> f64 {
+    let between: Vec<f64> =
+        measured.iter().filter_map(|&i| summaries[i].sd()).map(|sd| sd * sd).collect();
+    if !between.is_empty() {
+        return mean(&between).sqrt();
+    }
+    if measured.iter().all(|&i| own(i).is_some()) {
+        return 0.0;
+    }
+    let rest = |run: &[f64]| measured.iter().map(|&i| summaries[i].mean - run[i]).collect();
+    let square = |rest: &Vec<f64>| rest.iter().map(|y| y * y).sum::<f64>();
+    let rests = runs.map(rest);
+    let nearest = rests.min_by(|a: &Vec<f64>, b| square(a).total_cmp(&square(b)));
+    nearest.map_or(0.0, |rest| roughness(&rest))
 }
 
 /// Standard deviation of white noise on a smooth curve, from the median size of its second differences `y₁ - 2 y₂ + y₃`, whose
