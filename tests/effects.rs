@@ -92,6 +92,9 @@ fn a_gain_and_a_delay_are_found_with_the_parameter() {
         assert!(off < error, "the mean of {name} is {} and not {mean} ± {sd}", number("mean"));
         assert!((number("sd") / sd - 1.0).abs() < 0.1, "{name}: sd {} and not {sd}", number("sd"));
     }
+    // The response at the MAP has the effects: without them it is off by more than three times the noise.
+    let rmse = found["rmse"]["map"].as_f64().unwrap();
+    assert!(rmse < 0.5 * NOISE, "{rmse}");
     assert_eq!(found["parameters"]["cable.time"]["unit"], "s");
     assert_eq!(found["parameters"]["cable.time"]["role"], "hyperparameter");
 }

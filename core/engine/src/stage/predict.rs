@@ -1,6 +1,7 @@
 //! Responses of the forward map with the study's effects.
 
 use lacuna::plugin::Forward;
+use lacuna::plugin::effect::Placed;
 use lacuna_linalg::Matrix;
 
 use crate::study::Study;
@@ -37,19 +38,24 @@ fn batch(study: &Study, forward: &dyn Forward, points: &Matrix) -> Vec<Vec<f64>>
     let theta = Matrix::from_rows(d, points.iter_rows().map(|p| &p[..d]));
     let mean = forward.mean(&theta);
     let effects = study.placed_effects();
-    mean.iter_rows()
-        .zip(points.iter_rows())
-        .map(|(mean, point)| {
-            let mut response = mean.to_vec();
-            let mut from = d;
-            for effect in &effects {
-                let count = effect.absent().len();
-                response = effect.apply(&response, &point[from..from + count], &point[..d]);
-                from += count;
-            }
-            response
-        })
-        .collect()
+    let rows = mean.iter_rows().zip(points.iter_rows());
+    rows.map(|(mean, point)| with_effects(&effects, mean.to_vec(), point.split_at(d))).collect()
+}
+
+/// A response of the model with effects. The point is given as its parameters, and what follows them: the unknowns of the
+/// effects first.
+pub fn with_effects(
+    effects: &[Placed<'_>],
+    mut response: Vec<f64>,
+    (parameters, others): (&[f64], &[f64]),
+) -> Vec<f64> {
+    let mut from = 0;
+    for effect in effects {
+        let count = effect.absent().len();
+        response = effect.apply(&response, &others[from..from + count], parameters);
+        from += count;
+    }
+    response
 }
 
 #[cfg(test)]

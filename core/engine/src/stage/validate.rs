@@ -133,9 +133,12 @@ impl Work<'_> {
         calibrated: &Calibrated,
         likelihood: &dyn Likelihood,
     ) -> Result<Validated, Stop> {
-        let d = self.study.parameters.len();
         let mut failed = Vec::new();
-        let mut cases = vec![self.case("map", &calibrated.outcome.map[..d], &mut failed)?];
+        let map = &calibrated.outcome.map;
+        let d = self.study.parameters.len();
+        let effects = self.study.placed_effects();
+        let with_effects = |response| predict::with_effects(&effects, response, map.split_at(d));
+        let mut cases = vec![self.case("map", &map[..d], &with_effects, &mut failed)?];
         if self.study.validate.against == Some(Against::Reference) {
             // The reference of a field is its mean or median.
             let of_fields = |unknown: &Unknown| unknown.of_field().then_some(0.0);
@@ -143,7 +146,8 @@ impl Work<'_> {
             let point: Vec<f64> = both
                 .filter_map(|(p, unknown)| p.reference.or_else(|| of_fields(unknown)))
                 .collect();
-            cases.push(self.case("reference", &point, &mut failed)?);
+            // Reference values are those of the model alone.
+            cases.push(self.case("reference", &point, &|response| response, &mut failed)?);
         }
         let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
         let random = stream(self.study, "validate");
@@ -156,6 +160,7 @@ impl Work<'_> {
         &self,
         name: &str,
         point: &[f64],
+        with_effects: &dyn Fn(Vec<f64>) -> Vec<f64>,
         failed: &mut Vec<String>,
     ) -> Result<ValidationCase, Stop> {
         let simulated = match (&self.simulator, self.rerun) {
@@ -175,6 +180,7 @@ impl Work<'_> {
         let row = Matrix::from_vec(1, point.len(), point.to_vec());
         let is_simulated = simulated.is_some();
         let response = simulated.unwrap_or_else(|| self.forward.mean(&row).row(0).to_vec());
+        let response = with_effects(response);
         let accuracy = accuracy(&self.measured.used, &response);
         let shares: Vec<f64> = accuracy.iter().map(|a| a.1).collect();
         let average = if shares.is_empty() { 0.0 } else { moments::mean(&shares) };

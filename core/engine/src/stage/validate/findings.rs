@@ -26,7 +26,8 @@ pub struct ValidationCase {
     pub name: String,
     /// Values of the parameters, in the study's order and units.
     pub point: Vec<f64>,
-    /// Response at these parameters, one value per output: simulated if the model was run, else emulated.
+    /// Response at these parameters, one value per output: simulated if the model was run, else emulated. That at the MAP
+    /// has the study's effects.
     pub response: Vec<f64>,
     /// True if the model itself was run.
     pub simulated: bool,
