@@ -150,9 +150,16 @@ fn figures_are_written_beside_the_report() {
         rest.split_once('"').unwrap().0.to_owned()
     };
     let names: Vec<String> = page.split("<figure class=\"drawn\"").skip(1).map(name).collect();
-    for name in
-        ["measurements", "residuals", "posterior-draws", "rank-plots", "autocorrelation", "pairs"]
-    {
+    for name in [
+        "measurements",
+        "residuals",
+        "posterior-draws",
+        "rank-plots",
+        "autocorrelation",
+        "pairs",
+        "main-effects",
+        "loo-pit",
+    ] {
         assert!(names.iter().any(|own| own == name), "no {name} in {names:?}");
     }
     for name in names {

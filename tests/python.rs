@@ -30,6 +30,42 @@ fn python(script: &str, arguments: &[&Path]) -> Option<serde_json::Value> {
     Some(serde_json::from_str(text.lines().last().unwrap()).unwrap())
 }
 
+/// Probabilities of values below the data under their leave-one-out predictions, from the groups of `posterior.nc`.
+const LOO_PIT: &str = r"
+import json, sys
+import arviz as az
+import numpy as np
+data = az.from_netcdf(sys.argv[1])
+name = next(iter(data.log_likelihood.data_vars))
+rows = lambda group: data[group][name].stack(draws=('chain', 'draw')).transpose('draws', ...).values
+density, simulated = (rows(group).reshape(rows(group).shape[0], -1) for group in ('log_likelihood', 'posterior_predictive'))
+measured = data.observed_data[name].values.ravel()
+known = np.isfinite(measured)
+weights, _ = az.psislw(-density[:, known].T, reff=1.0)
+pit = az.loo_pit(y=measured[known], y_hat=simulated[:, known].T, log_weights=weights)
+print(json.dumps([float(p) for p in pit]))
+";
+
+#[test]
+fn arviz_places_the_data_in_their_predictions_as_we_do() {
+    let folder = quick::simulated();
+    let out = folder.path().join("run");
+    let ran = quick::run(&folder.path().join("study.toml"), &[], &out);
+    ran.unwrap_or_else(|stop| panic!("{stop}"));
+    let Some(theirs) = python(LOO_PIT, &[&out.join("posterior.nc")]) else { return };
+    let kept = lacuna_run::arrays::read(&out.join("6-evidence/left_out.nc"), "below").unwrap();
+    let theirs: Vec<f64> = serde_json::from_value(theirs).unwrap();
+    let mut ours = kept.into_values();
+    assert_eq!(ours.len(), theirs.len());
+    // The file has the data in the order of its axes, the run by replicate; the draws are not independent, so that the
+    // length of the smoothed tail, and with it the weights, differ a little.
+    let mut sorted = theirs.clone();
+    sorted.sort_by(f64::total_cmp);
+    ours.sort_by(f64::total_cmp);
+    let farthest = ours.iter().zip(&sorted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(farthest < 0.01, "{farthest}");
+}
+
 /// Mean and standard deviation of each variable as computed by arviz, and the shapes of all groups.
 const ARVIZ: &str = r"
 import json, sys

@@ -133,8 +133,11 @@
       const marked = document.querySelectorAll(`figure[data-name="${figure}"] path.brushed`).length;
       if (marked === 0) note(`a region of the pairs marks no response in ${figure}`);
     }
+    const residuals = document.querySelector('figure[data-name="residuals"]');
+    const shaded = () => residuals ? residuals.querySelectorAll("rect.of-draws").length : 0;
+    if (residuals && !shaded()) note("a region of the pairs changes no residual");
     key(svg, "Escape");
-    if (document.querySelectorAll(".brushed").length) note("Escape leaves marks");
+    if (document.querySelectorAll(".brushed").length || shaded()) note("Escape leaves marks");
   }
   if (window.axe) {
     const found = await window.axe.run(document, { resultTypes: ["violations"] });

@@ -30,7 +30,7 @@ use crate::stage::emulated::Emulated;
 use crate::stage::evidence::Weighed;
 use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::more_runs::within;
-use crate::stage::predictions::Predicting;
+use crate::stage::predictions::{Predicting, Predictor};
 use crate::stage::surrogate::Fitting;
 use crate::stage::{
     assess, calibrate, contents, design, evidence, grouped, inference_data, low_fidelity, manifest,
@@ -307,13 +307,15 @@ fn weigh(
     let parts = calibrate::Parts::of(study, measured, problem)?;
     let centred: Vec<f64> = calibrated.value.outcome.centred().collect();
     let posterior = parts.posterior(study, problem).with_centred(&centred, &[]);
-    let predicting = Predicting {
+    let densities = Predicting {
         forward: problem.forward(),
         likelihood: parts.likelihood(),
         law: calibrate::Law::of(study, measured, problem)?,
         data: &measured.likelihood,
     };
-    evidence::stage(study, &posterior, calibrated, Some(predicting), run, observer).map(Some)
+    let predictive = calibrate::Parts::predicting(study, measured, problem)?;
+    let predictor = Predictor { densities, makes: predictive.likelihood() };
+    evidence::stage(study, &posterior, calibrated, Some(&predictor), run, observer).map(Some)
 }
 
 /// Samples a given log density: nothing is simulated, read or emulated.

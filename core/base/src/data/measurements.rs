@@ -155,6 +155,12 @@ impl Observations {
         self.blocks.iter().any(Measurements::states_noise)
     }
 
+    /// The measured values by block, replicate and output, without the missing ones.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        let replicates = self.blocks.iter().flat_map(|block| &block.replicates);
+        replicates.flat_map(|replicate| replicate.values.iter().flatten()).copied()
+    }
+
     /// Number of measured values over all blocks.
     pub fn count(&self) -> usize {
         self.blocks.iter().map(Measurements::count).sum()

@@ -5,6 +5,8 @@
 //! Vehtari, Computational Statistics 36 (2021) 1243). The part left out may be a whole curve, with the joint density of
 //! its values.
 
+use std::cmp::Ordering;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -89,6 +91,32 @@ impl LeaveOneOut {
             curve,
         }
     }
+}
+
+/// Probability of a value below the measured one under the prediction of each datum from all others (LOO-PIT).
+///
+/// `simulated` holds data simulated at the draws of `log_density` (`draws x data`); their weights are the smoothed
+/// importance ratios of the datum that is left out. If the predictions are right the probabilities are uniform (Gelman,
+/// Bayesian Data Analysis, 3rd edition, section 7.4; Säilynoja, Bürkner and Vehtari, Statistics and Computing 32 (2022)
+/// 32). NaN for a datum without weights or simulated values.
+pub fn probabilities_below(
+    measured: &[f64],
+    simulated: &Matrix,
+    log_density: &Matrix,
+    efficiency: f64,
+) -> Vec<f64> {
+    let one = |(i, measured): (usize, &f64)| {
+        let ratios: Vec<f64> = log_density.column(i).iter().map(|l| -l).collect();
+        let weights = smooth_dependent(&ratios, efficiency).log_weights;
+        let below = |(weight, value): (&f64, f64)| match value.partial_cmp(measured) {
+            Some(Ordering::Less) => weight.exp(),
+            Some(Ordering::Equal) => 0.5 * weight.exp(),
+            Some(Ordering::Greater) => 0.0,
+            None => f64::NAN,
+        };
+        weights.iter().zip(simulated.column(i)).map(below).sum()
+    };
+    measured.par_iter().enumerate().map(one).collect()
 }
 
 /// Difference in predictive density between two models.

@@ -1,4 +1,4 @@
-// Tools of the figures, choice of panels, regions of the pairs, legends, light and dark.
+// Tools of the figures, choice of panels, zoom, legends, light and dark.
 
 // Panels that are not shown, by title; a choice holds for all figures.
 const unwanted = new Set();
@@ -37,58 +37,6 @@ const chooser = (titles, name) => {
   }
   details.append(summary, set);
   return details;
-};
-
-// Draws of the posterior with their responses.
-const source = document.getElementById("draws");
-const draws = source ? JSON.parse(source.textContent).values : null;
-const isPairs = (node) => draws && node.dataset.name === "pairs";
-
-const unmark = () => {
-  for (const shape of document.querySelectorAll("[data-overlay]")) shape.remove();
-};
-const overlay = (plot, shape) => {
-  shape.dataset.overlay = "";
-  plot.inside.append(shape);
-};
-// The draws in a rectangle of a pair.
-const within = (plot, area) => {
-  const { x, y } = plot.drawn;
-  const [low, high] = [[valueAt(x, area.left), valueAt(y, area.bottom)], [valueAt(x, area.right), valueAt(y, area.top)]];
-  return draws.map((_, i) => i).filter((i) => {
-    const [u, v] = [draws[i][plot.pair.column], draws[i][plot.pair.row]];
-    return u >= low[0] && u <= high[0] && v >= low[1] && v <= high[1];
-  });
-};
-// The same curve in another plot, whose axes show the same quantities in other ranges.
-const carried = (path, from, to) => {
-  const at = ([x, y]) => [placeOf(to.shown.x, valueAt(from.drawn.x, x)), placeOf(to.shown.y, valueAt(from.drawn.y, y))];
-  const pieces = piecesOf(path).map((piece) => `M${piece.map((p) => at(p).map((v) => v.toFixed(1)).join(" ")).join("L")}`);
-  const marked = element("path", { class: "brushed", d: pieces.join("") });
-  marked.pieces = piecesOf(path).map((piece) => piece.map(([x, y]) => [placeOf(to.drawn.x, valueAt(from.drawn.x, x)), placeOf(to.drawn.y, valueAt(from.drawn.y, y))]));
-  return marked;
-};
-// Marks draws in all pairs, and their responses in all figures that have them.
-const markDraws = (figure, chosen) => {
-  unmark();
-  for (const plot of figure.plots.filter((own) => own.pair)) {
-    const { x, y } = plot.drawn;
-    const dot = (i) => `M${placeOf(x, draws[i][plot.pair.column]).toFixed(1)} ${placeOf(y, draws[i][plot.pair.row]).toFixed(1)}l.1 0`;
-    if (chosen.length) overlay(plot, element("path", { class: "brushed-point", d: chosen.map(dot).join("") }));
-  }
-  for (const plot of figures.flatMap(({ plots }) => plots)) {
-    const paths = new Map([...plot.inside.querySelectorAll("path.s-draw")].map((path) => [path.dataset.name, path]));
-    if (!paths.size) continue;
-    // The panels of the calibrated simulation with the same title show the same quantity.
-    const alike = figures.filter(({ node }) => node.dataset.name === "validation").flatMap(({ plots }) => plots)
-      .filter((other) => titleOf(other.svg) === titleOf(plot.svg) && other.labels.y === plot.labels.y);
-    for (const path of chosen.map((i) => paths.get(`draw ${i + 1}`)).filter((own) => own)) {
-      for (const to of [plot, ...alike]) overlay(to, carried(path, plot, to));
-    }
-  }
-  const some = chosen.length === 1 ? `Draw ${chosen[0] + 1}` : `${chosen.length} of ${draws.length} drawn draws`;
-  figure.note.textContent = `${some} chosen; responses at chosen draws are marked in the figures below. Escape clears.`;
-  heard.textContent = `${some} chosen`;
 };
 
 // Zoom of the panels of a figure; those with the same axes move together.
@@ -154,7 +102,7 @@ const choosing = (figure, tools) => {
   };
   figure.note = document.createElement("p");
   figure.note.className = "note";
-  figure.note.textContent = "Drag over a region of a pair, or walk from draw to draw with the arrows: draws and their responses in the figures below are marked.";
+  figure.note.textContent = "Drag over a region of a pair, or walk from draw to draw with the arrows: draws and their responses in the figures below are marked, and the map of residuals shows theirs.";
   tools.after(figure.note);
 };
 

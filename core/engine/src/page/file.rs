@@ -9,7 +9,7 @@ pub const PALETTE: &str = include_str!("palette.css");
 /// Style sheet of drawings.
 pub const DRAWING: &str = include_str!("drawing.css");
 
-/// Width of the file, that of three panels.
+/// Width of a file without a wider drawing, that of three panels.
 const WIDTH: f64 = 1044.0;
 const GAP: f64 = 12.0;
 const MARGIN: f64 = 10.0;
@@ -20,10 +20,11 @@ const LETTER: f64 = 6.8;
 /// The drawings of a figure in one file.
 pub fn composed(drawings: &[Drawing], keys: &[Key], title: &str) -> String {
     let mut body = String::new();
+    let whole = drawings.iter().map(|drawing| size(drawing.svg()).0).fold(WIDTH, f64::max);
     let (mut x, mut y) = (0.0, 0.0);
     for key in keys {
         let width = 44.0 + LETTER * key.label.chars().count() as f64;
-        if x > 0.0 && x + width > WIDTH {
+        if x > 0.0 && x + width > whole {
             (x, y) = (0.0, y + LINE);
         }
         body.push_str(&format!(
@@ -40,7 +41,7 @@ pub fn composed(drawings: &[Drawing], keys: &[Key], title: &str) -> String {
     for drawing in drawings {
         let (width, height) = size(drawing.svg());
         let alone = matches!(drawing.form, Form::Wide(..));
-        if x > 0.0 && (alone || x + width > WIDTH) {
+        if x > 0.0 && (alone || x + width > whole) {
             (x, y, row) = (0.0, y + row + GAP, 0.0);
         }
         let inner = drawing.svg().replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1);
@@ -48,7 +49,7 @@ pub fn composed(drawings: &[Drawing], keys: &[Key], title: &str) -> String {
         row = row.max(height);
         x += width + GAP;
     }
-    let (width, height) = (WIDTH + 2.0 * MARGIN, y + row + 2.0 * MARGIN);
+    let (width, height) = (whole + 2.0 * MARGIN, y + row + 2.0 * MARGIN);
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"-{MARGIN} -{MARGIN} {width} {height}\" width=\"{width}\" \
          height=\"{height}\" role=\"img\"><title>{}</title><style>{}</style>\
@@ -113,5 +114,12 @@ mod tests {
         {
             assert!(file.contains(place), "no {place} in {file}");
         }
+    }
+
+    #[test]
+    fn a_file_is_as_wide_as_its_widest_drawing() {
+        let svg = "<svg xmlns=\"x\" viewBox=\"0 0 1500 100\" width=\"1500\" height=\"100\"></svg>";
+        let file = composed(&[Drawing::scrolled(svg.into(), ["", ""], Vec::new())], &[], "wide");
+        assert!(file.contains("width=\"1520\" height=\"120\" role"), "{file}");
     }
 }

@@ -70,6 +70,7 @@ pub const SCRIPT: &str = concat!(
     include_str!("plot.js"),
     include_str!("explore.js"),
     include_str!("files.js"),
+    include_str!("draws.js"),
     include_str!("figure.js"),
     "})();"
 );

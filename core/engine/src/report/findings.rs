@@ -14,7 +14,9 @@ use crate::screening::{ActiveSubspace, Screening};
 pub use crate::gap::result::GapFindings;
 use crate::stage::calibrate::PopulationOutcome;
 pub use crate::stage::drawn::DrawnResponses;
+pub use crate::stage::energies::Energies;
 pub use crate::stage::fields::{FieldBand, FieldFindings};
+pub use crate::stage::main_effects::MainEffect;
 pub use crate::stage::mixing::Mixing;
 pub use crate::stage::quantities::{
     Bounds, BoundsFindings, End, InputShare, PROBABILITIES, Propagated, QuantityFindings, Range,
@@ -154,6 +156,8 @@ pub struct SurrogateFindings {
     pub total_by_output: Option<Matrix>,
     /// First-order and total Sobol indices over all outputs, one pair per parameter, if known.
     pub sobol: Option<Vec<(f64, f64)>>,
+    /// Main effects of the parameters of the runs, the largest first.
+    pub main_effects: Vec<MainEffect>,
 }
 
 /// Posterior of all unknowns.
@@ -185,6 +189,8 @@ pub struct CalibrationFindings {
     pub best_draw: Vec<f64>,
     /// How the chains of the first coordinates mix.
     pub mixing: Vec<Mixing>,
+    /// Energies of a Hamiltonian sampler.
+    pub energies: Option<Energies>,
     /// Facts about the sampler.
     pub facts: Vec<Fact>,
     /// Populations from which parameters by group are drawn.
@@ -214,6 +220,9 @@ pub struct LeftOutFindings {
     pub count: usize,
     /// Shape k-hat of the importance ratios of each datum, in the order of the likelihood.
     pub k_hat: Vec<f64>,
+    /// Probability of a value below the measured one under the prediction of each datum (LOO-PIT), in the order of the
+    /// likelihood; empty if it is not known.
+    pub below: Vec<f64>,
     /// Prediction of whole curves, each from all others.
     pub curves: Option<CurvesLeftOutFindings>,
 }

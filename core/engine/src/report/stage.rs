@@ -26,8 +26,10 @@ use crate::screening::{Screening, screen};
 use crate::stage::artifacts::Artifacts;
 use crate::stage::calibrate::Calibrated;
 use crate::stage::drawn::drawn;
+use crate::stage::energies::energies;
 use crate::stage::evidence::Weighed;
 use crate::stage::inverse_problem::InverseProblem;
+use crate::stage::main_effects::main_effects;
 use crate::stage::mixing::mixing;
 use crate::stage::read::Measured;
 use crate::stage::validate::Validated;
@@ -120,7 +122,7 @@ fn findings(
             Some(ensemble(study, problem, problem.data.value.ensemble.as_ref()?))
         }),
         measured: measured.map(|m| measurements(study, m)),
-        surrogate: all.problem.and_then(|problem| surrogate(problem, all.validated)),
+        surrogate: all.problem.and_then(|problem| surrogate(study, problem, all.validated)),
         warnings: {
             let named = results.gap.and_then(|kept| kept.value.warning()).map(str::to_owned);
             warnings(observer).into_iter().chain(named).collect()
@@ -228,6 +230,7 @@ fn fingerprint(data: &Observations) -> String {
 }
 
 fn surrogate(
+    study: &Study,
     problem: &InverseProblem<'_>,
     validated: Option<&Kept<Validated>>,
 ) -> Option<SurrogateFindings> {
@@ -253,6 +256,7 @@ fn surrogate(
         loo_by_output: errors.loo_by_output.clone(),
         total_by_output: problem.emulator()?.sensitivity().map(|s| s.outputs.total),
         sobol,
+        main_effects: main_effects(study, problem),
     })
 }
 
@@ -284,6 +288,7 @@ fn calibration(
         verdict: verdict(&outcome.diagnosis),
         log_density: (outcome.map_log_density, outcome.best_draw.1),
         best_draw: outcome.best_draw.0.clone(),
+        energies: energies(&calibrated.statistics, outcome.burn_in),
         mixing: mixing(&kept, &outcome.diagnosis.stranded.to_the_end, &times),
         facts: outcome.facts.clone(),
         populations: outcome.populations.clone(),
@@ -297,6 +302,7 @@ fn calibration(
             limit: loo.limit,
             count: loo.data.len(),
             k_hat: loo.data.iter().map(|left| left.k_hat).collect(),
+            below: weighed.map(|w| w.below.clone()).unwrap_or_default(),
             curves: weighed.and_then(|w| w.curves_left_out.as_ref()).map(|curves| {
                 CurvesLeftOutFindings {
                     elpd: curves.elpd,

@@ -5,7 +5,7 @@
 mod kept;
 
 use lacuna::data::Draws;
-use lacuna::diagnose::leave_one_out::LeaveOneOut;
+use lacuna::diagnose::leave_one_out::{LeaveOneOut, probabilities_below};
 use lacuna::plugin::sampler::Evidence;
 use lacuna::run::{Observer, Stop};
 use lacuna_linalg::Matrix;
@@ -14,7 +14,7 @@ use serde_json::json;
 
 use super::calibrate::Calibrated;
 use super::curves::{self, Curves};
-use super::predictions::{self, Chosen, Predicting};
+use super::predictions::{self, Chosen, Predictor};
 use super::stream;
 use crate::page::number::significant;
 use crate::posterior::{Posterior, bridge};
@@ -29,6 +29,9 @@ pub struct Weighed {
     pub evidence: Option<Evidence>,
     /// Leave-one-out prediction of each datum, if the discrepancy supports it.
     pub left_out: Option<LeaveOneOut>,
+    /// Probability of a value below the measured one under the leave-one-out prediction of each datum; empty if it is
+    /// not known.
+    pub below: Vec<f64>,
     /// Leave-one-out prediction of each curve, if the discrepancy supports it and there are several.
     pub curves_left_out: Option<LeaveOneOut>,
     /// Log density of each curve given all other data and the parameters, at the draws of [`Chosen`]
@@ -43,7 +46,7 @@ pub fn stage(
     study: &Study,
     posterior: &Posterior<'_>,
     calibrated: &Kept<Calibrated>,
-    predicting: Option<Predicting<'_>>,
+    predictor: Option<&Predictor<'_>>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Kept<Weighed>, Stop> {
@@ -81,8 +84,8 @@ pub fn stage(
             };
             let weighed = Weighed { evidence, missing, ..Weighed::default() };
             // Given all other data the distribution of a cut parameter is not that of left-out data.
-            match predicting.filter(|_| outcome.cut.is_none()) {
-                Some(p) => weighed.predicting(study, &p, &calibrated.value),
+            match predictor.filter(|_| outcome.cut.is_none()) {
+                Some(p) => weighed.predicting(study, p, &calibrated.value),
                 None => Ok(weighed),
             }
         },
@@ -136,9 +139,10 @@ impl Weighed {
     fn predicting(
         mut self,
         study: &Study,
-        p: &Predicting<'_>,
+        predictor: &Predictor<'_>,
         calibrated: &Calibrated,
     ) -> Result<Self, Stop> {
+        let p = &predictor.densities;
         let data = p.data.count();
         let chosen = Chosen::of(calibrated, data);
         let responses = predictions::responses(study, p, &chosen);
@@ -152,6 +156,12 @@ impl Weighed {
                 "leave-one-out predictions of {data} data use {count} draws and are too many to be written to \
                  `posterior.nc`"
             ));
+        }
+        if let Some(responses) = responses.as_ref().filter(|_| chosen.written) {
+            let points = &chosen.points;
+            let new = predictions::simulated_from_posterior(study, predictor, responses, points);
+            let measured: Vec<f64> = p.data.values().collect();
+            self.below = probabilities_below(&measured, &new, &densities, chosen.efficiency);
         }
         let curves = Curves::of(p.data);
         self.left_out = Some(LeaveOneOut::of(&densities, chosen.efficiency, curves.of.clone()));

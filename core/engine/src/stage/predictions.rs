@@ -1,14 +1,15 @@
-//! Predictions of the data at selected draws of the posterior: the log density of each datum.
+//! Predictions of the data at selected draws of the posterior: the log density of each datum, and simulated data.
 
-use lacuna::data::{Draws, Observations};
+use lacuna::data::{Draws, Measurements, Observations};
 use lacuna::diagnose::chains;
 use lacuna::math::moments::mean;
+use lacuna::math::random::Stream;
 use lacuna::plugin::{Forward, Likelihood};
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
 use super::calibrate::{Calibrated, Law};
-use super::predict;
+use super::{predict, stream};
 use crate::study::Study;
 
 /// Quantities from which the data are predicted.
@@ -21,6 +22,14 @@ pub struct Predicting<'a> {
     pub law: Law<'a>,
     /// Data of the likelihood.
     pub data: &'a Observations,
+}
+
+/// Densities of the measured data, and a simulator of new ones.
+pub struct Predictor<'a> {
+    /// Densities of the measured data.
+    pub densities: Predicting<'a>,
+    /// Likelihood that simulates data around a response.
+    pub makes: &'a dyn Likelihood,
 }
 
 /// Number of draws at which the data are predicted, if there are as many.
@@ -158,6 +167,40 @@ pub fn pointwise(
         }
     }
     all
+}
+
+/// Data simulated at draws of the posterior, one set per row, in the order of the measured ones: the group
+/// `posterior_predictive` of `posterior.nc`.
+pub fn simulated_from_posterior(
+    study: &Study,
+    p: &Predictor<'_>,
+    responses: &[Vec<f64>],
+    points: &Matrix,
+) -> Matrix {
+    simulated(p, responses, points, &stream(study, "posterior_predictive"))
+}
+
+/// Simulated data, one set per row, in the order of the measured ones.
+pub fn simulated(
+    p: &Predictor<'_>,
+    responses: &[Vec<f64>],
+    points: &Matrix,
+    random: &Stream,
+) -> Matrix {
+    let (own, count) = (p.makes.hyperparameters().len(), p.densities.data.count());
+    let one = |(i, response): (usize, &Vec<f64>)| -> Vec<f64> {
+        let point = points.row(i);
+        let hyper = &point[point.len() - own..];
+        let blocks = p.makes.simulate(response, hyper, &random.named("data").at(i as u64));
+        let values = |block: &Measurements| -> Vec<f64> {
+            block.replicates.iter().flat_map(|r| r.values.iter().flatten()).copied().collect()
+        };
+        let all: Vec<f64> = blocks.iter().flat_map(values).collect();
+        // A failing discrepancy in a library reports its fault separately.
+        if all.len() == count { all } else { vec![f64::NAN; count] }
+    };
+    let rows: Vec<Vec<f64>> = responses.par_iter().enumerate().map(one).collect();
+    Matrix::from_rows(count, rows)
 }
 
 #[cfg(test)]

@@ -70,6 +70,45 @@ fn the_difference_is_that_of_arviz() {
 }
 
 #[test]
+#[allow(clippy::unreadable_literal)]
+fn the_probabilities_below_are_those_of_arviz() {
+    // Source: ArviZ 0.23.4, arviz.loo_pit(y, y_hat, log_weights of psislw(..., reff=1)).
+    let truth = [
+        0.0459022997860419,
+        0.2056523967574425,
+        0.5235918139988889,
+        0.22106374710421797,
+        0.1728581368312304,
+        0.6647633586593016,
+        0.7693308602825085,
+        0.3989465060603961,
+        0.6324306263920632,
+        0.9335857965999962,
+        0.8949349685308411,
+        0.5697266086146938,
+    ];
+    let (draws, data) = (400, 12);
+    let simulated = Matrix::from_fn(draws, data, |s, i| {
+        let p = (((s * 41 + i * 17) % draws) as f64 + 0.5) / draws as f64;
+        (1.7 * i as f64).cos() + 0.8 * (p / (1.0 - p)).ln()
+    });
+    let measured: Vec<f64> = (0..data).map(|k| 0.3 * k as f64 - 1.5).collect();
+    let densities = densities(draws, data, 0.0, 0.5);
+    let found = probabilities_below(&measured, &simulated, &densities, 1.0);
+    for (ours, theirs) in found.iter().zip(truth) {
+        assert!((ours - theirs).abs() < 1e-9, "{ours} and {theirs}");
+    }
+}
+
+#[test]
+fn equal_values_count_half_and_unknown_ones_are_told() {
+    let densities = Matrix::zeros(4, 2);
+    let simulated = Matrix::from_rows(2, [[1.0, 1.0], [2.0, 2.0], [2.0, f64::NAN], [3.0, 4.0]]);
+    let found = probabilities_below(&[2.0, 2.0], &simulated, &densities, 1.0);
+    assert!((found[0] - 0.5).abs() < 1e-12 && found[1].is_nan(), "{found:?}");
+}
+
+#[test]
 fn left_out_normal_data_have_their_exact_predictions() {
     // n normal data of variance one with a flat prior on their mean: the posterior is N(mean, 1 / n), and a datum given
     // the others is N(mean of those, 1 + 1 / (n - 1)).

@@ -49,25 +49,17 @@ const LETTERS: usize = 46;
 
 /// Draws panels with the same axes, so that amplitudes can be compared; a single panel takes the full width.
 pub fn small_multiples(panels: &[Panel], x: &Axis, y: &Axis, description: &str) -> Vec<Drawing> {
+    let each: Vec<(&Panel, &Axis)> = panels.iter().map(|panel| (panel, x)).collect();
+    multiples(&each, y, description)
+}
+
+/// Draws panels with the same vertical axis, each with a horizontal one of its own.
+pub fn multiples(panels: &[(&Panel, &Axis)], y: &Axis, description: &str) -> Vec<Drawing> {
     let letters = |p: &Panel| p.title.chars().count() + p.remark.chars().count();
-    let wrapped = panels.iter().any(|p| letters(p) > LETTERS);
-    let one = |panel: &Panel| {
+    let wrapped = panels.iter().any(|(p, _)| letters(p) > LETTERS);
+    let one = |&(panel, x): &(&Panel, &Axis)| {
         let words = in_words(panel, (x, y), description);
-        let draw = |width: f64| {
-            let height = if width > PANEL { 250.0 } else { 190.0 };
-            // A label is written upwards beside the axis.
-            let tall = LETTER * y.label.chars().count() as f64 + TOP + BOTTOM;
-            let height = f64::max(height, tall.min(320.0));
-            let top = if wrapped && width == PANEL { TOP + 15.0 } else { TOP };
-            let mut svg = Svg::new(width, height + top - TOP);
-            let area = Area::new(LEFT, top, width - LEFT - 10.0, height - TOP - BOTTOM);
-            let most = if width > PANEL { x.ticks } else { x.ticks.min(5) };
-            let x = x.clone().ticks(most);
-            let frame = Frame::new(area, &x, y);
-            frame.axes(&mut svg, &x, y);
-            self::draw(&mut svg, panel, &frame, (&x, y));
-            svg.finish(&words)
-        };
+        let draw = |width: f64| one_panel(panel, (x, y), (width, wrapped), &words);
         let labels = [x.label.as_str(), y.label.as_str()];
         if panels.len() == 1 {
             Drawing::wide(draw, labels, values(panel))
@@ -76,6 +68,28 @@ pub fn small_multiples(panels: &[Panel], x: &Axis, y: &Axis, description: &str) 
         }
     };
     panels.iter().map(one).collect()
+}
+
+/// A panel of a width; `wrapped` leaves a second line for the remark.
+fn one_panel(
+    panel: &Panel,
+    (x, y): (&Axis, &Axis),
+    (width, wrapped): (f64, bool),
+    words: &str,
+) -> String {
+    let height = if width > PANEL { 250.0 } else { 190.0 };
+    // A label is written upwards beside the axis.
+    let tall = LETTER * y.label.chars().count() as f64 + TOP + BOTTOM;
+    let height = f64::max(height, tall.min(320.0));
+    let top = if wrapped && width == PANEL { TOP + 15.0 } else { TOP };
+    let mut svg = Svg::new(width, height + top - TOP);
+    let area = Area::new(LEFT, top, width - LEFT - 10.0, height - TOP - BOTTOM);
+    let most = if width > PANEL { x.ticks } else { x.ticks.min(5) };
+    let x = x.clone().ticks(most);
+    let frame = Frame::new(area, &x, y);
+    frame.axes(&mut svg, &x, y);
+    draw(&mut svg, panel, &frame, (&x, y));
+    svg.finish(words)
 }
 
 /// A panel in a sentence: its title and remark, and the range of its last named curve.

@@ -20,7 +20,7 @@ pub use bars::{BarChart, BarSeries, Level};
 pub use design::{DesignColumn, MOST_CROSSED, design_matrix};
 pub use heat_map::correlation_map;
 pub use histogram::{Marginal, Mark, SecondAxis, marginals};
-pub use lines::{Band, Curve, Panel, small_multiples};
+pub use lines::{Band, Curve, Panel, multiples, small_multiples};
 pub use pairs::{MOST_PAIRED, PairColumn, pair_matrix};
 pub use residual_map::{Strip, residual_map};
 pub use rows::{Row, row_chart};

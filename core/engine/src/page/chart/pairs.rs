@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::triangle::{Cell, triangle};
-use super::{Axis, Frame, Mark};
+use super::{Axis, Frame, Mark, shortened};
 use crate::page::curve::{quantile, smooth_density, sorted};
 use crate::page::drawing::{Datum, Drawing};
 use crate::page::scale::{extent, padded};
@@ -12,6 +12,8 @@ use crate::page::svg::{Anchor, Area, Path, Svg};
 /// One coordinate of the posterior, in the displayed unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairColumn {
+    /// Index of the coordinate among all.
+    pub index: usize,
     /// Name of the coordinate with its unit.
     pub label: String,
     /// Draws after the burn-in.
@@ -22,8 +24,15 @@ pub struct PairColumn {
     pub marks: Vec<Mark>,
 }
 
-/// Largest number of coordinates that fit on a page.
-pub const MOST_PAIRED: usize = 6;
+/// Largest number of coordinates in pairs.
+pub const MOST_PAIRED: usize = 12;
+
+/// Largest number of coordinates whose cells have room for long names, and letters of a name in smaller cells.
+const WIDE: usize = 6;
+const LETTERS: usize = 23;
+
+/// Smallest width of a hexagon.
+const NARROWEST: f64 = 9.0;
 
 /// Number of shades of the hexagons, from rare to frequent.
 const SHADES: usize = 6;
@@ -31,9 +40,9 @@ const SHADES: usize = 6;
 /// Draws all pairs of coordinates below the diagonal.
 pub fn pair_matrix(columns: &[PairColumn], description: &str) -> Drawing {
     let n = columns.len().min(MOST_PAIRED);
-    let axes: Vec<Axis> = columns[..n].iter().map(axis).collect();
+    let axes: Vec<Axis> = columns[..n].iter().map(|column| axis(column, n)).collect();
     let thinned = |column: &PairColumn| {
-        let stride = column.draws.len().div_ceil(MOST_LISTED).max(1);
+        let stride = (n * column.draws.len()).div_ceil(MOST_LISTED).max(1);
         let each = column.draws.iter().enumerate().step_by(stride);
         let number =
             |(i, value): (usize, &f64)| Datum::point(&column.label, "draw", (i as f64, *value));
@@ -45,7 +54,7 @@ pub fn pair_matrix(columns: &[PairColumn], description: &str) -> Drawing {
             draw_density(svg, area, &columns[index], &axes[index], &shown);
         }
         Cell::Pair { x, y, frame } => {
-            let places = [x.to_string(), y.to_string()];
+            let places = [columns[x].index.to_string(), columns[y].index.to_string()];
             let attributes = [("data-column", places[0].as_str()), ("data-row", &places[1])];
             svg.group(&attributes, |svg| {
                 frame.inside(svg, &axes[x], &axes[y], |svg| {
@@ -58,14 +67,20 @@ pub fn pair_matrix(columns: &[PairColumn], description: &str) -> Drawing {
     Drawing::scrolled(svg, ["number of the draw", "value"], values)
 }
 
-/// Approximate number of draws of a coordinate that are listed in the table of values.
-const MOST_LISTED: usize = 1000;
+/// Approximate number of values that are listed in the table of values.
+const MOST_LISTED: usize = 6000;
 
 /// Axis over all but the outermost 0.1 % of the draws, so that a few stray draws do not shrink the rest.
-fn axis(column: &PairColumn) -> Axis {
+/// Among many coordinates there is room for fewer letters.
+fn axis(column: &PairColumn, among: usize) -> Axis {
     let sorted = sorted(&column.draws);
     let domain = extent([quantile(&sorted, 0.0005), quantile(&sorted, 0.9995)]);
-    Axis::new(column.label.as_str(), padded(domain.unwrap_or((0.0, 1.0)), 0.12)).ticks(4)
+    let domain = padded(domain.unwrap_or((0.0, 1.0)), 0.12);
+    if among > WIDE {
+        Axis::new(shortened(&column.label, LETTERS), domain).ticks(3)
+    } else {
+        Axis::new(column.label.as_str(), domain).ticks(4)
+    }
 }
 
 fn draw_density(svg: &mut Svg, area: Area, column: &PairColumn, domain: &Axis, shown: &Axis) {
@@ -84,7 +99,7 @@ fn draw_density(svg: &mut Svg, area: Area, column: &PairColumn, domain: &Axis, s
             svg.line(&format!("line {}", mark.class), (place, area.y), (place, area.bottom()));
         }
     });
-    svg.text("panel-title", (area.x, area.y - 5.0), Anchor::Start, &column.label);
+    svg.text("panel-title", (area.x, area.y - 5.0), Anchor::Start, &domain.label);
 }
 
 fn draw_marks(svg: &mut Svg, frame: &Frame, across: &[Mark], along: &[Mark]) {
@@ -107,7 +122,7 @@ fn draw_marks(svg: &mut Svg, frame: &Frame, across: &[Mark], along: &[Mark]) {
 /// The nearest point of two interleaved rectangular lattices is the nearest centre of a hexagonal lattice (Carr,
 /// Littlefield, Nicholson and Littlefield, JASA 82, 1987).
 fn draw_hexagons(svg: &mut Svg, frame: &Frame, x: &[f64], y: &[f64]) {
-    let width = frame.area.width / 22.0;
+    let width = (frame.area.width / 22.0).max(NARROWEST);
     let height = width * 3.0_f64.sqrt();
     let mut counts: BTreeMap<(i64, i64, bool), usize> = BTreeMap::new();
     for point in x.iter().zip(y).map(|(&x, &y)| frame.at((x, y))) {

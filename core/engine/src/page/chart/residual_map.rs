@@ -57,17 +57,29 @@ fn sized(strips: &[Strip], x: &Axis, width: f64, description: &str) -> String {
         let name = shortened(&strip.name, ((names - 8.0) / 6.4) as usize);
         svg.text("tick", (names - 8.0, top + 0.5 * HEIGHT + 4.0), Anchor::End, &name);
         let width = area.width / cells as f64;
-        for (k, value) in extremes(strip, x.domain, cells).into_iter().enumerate() {
-            let Some((at, value)) = value else { continue };
-            let cell = Area::new(area.x + k as f64 * width, top + 1.0, width + 0.3, HEIGHT - 2.0);
-            let hint = format!(
-                "{}, {}: {}",
-                strip.name,
-                with_unit(&x.label, &typeset(&significant(at, 3))),
-                typeset(&fixed(value, 1))
-            );
-            svg.rectangle(&format!("strip {}", shade(value)), cell, &hint);
-        }
+        // The page's script finds the cell of a place by these.
+        let told = [
+            ("data-ends", format!("{:e} {:e}", x.domain.0, x.domain.1)),
+            ("data-cells", cells.to_string()),
+            ("data-left", area.x.to_string()),
+            ("data-width", width.to_string()),
+        ];
+        let told = told.iter().map(|(name, value)| (*name, value.as_str()));
+        let attributes: Vec<_> = told.chain([("data-strip", strip.name.as_str())]).collect();
+        svg.group(&attributes, |svg| {
+            for (k, value) in extremes(strip, x.domain, cells).into_iter().enumerate() {
+                let Some((at, value)) = value else { continue };
+                let left = area.x + k as f64 * width;
+                let cell = Area::new(left, top + 1.0, width + 0.3, HEIGHT - 2.0);
+                let hint = format!(
+                    "{}, {}: {}",
+                    strip.name,
+                    with_unit(&x.label, &typeset(&significant(at, 3))),
+                    typeset(&fixed(value, 1))
+                );
+                svg.rectangle(&format!("strip {}", shade(value)), cell, &hint);
+            }
+        });
     }
     for (i, strip) in strips.iter().enumerate() {
         for &(from, to) in &strip.outlines {

@@ -29,7 +29,7 @@ pub enum Cell {
 pub fn triangle(axes: &[Axis], description: &str, draw: impl Fn(&mut Svg, Cell)) -> String {
     let n = axes.len();
     let grid = Grid::new(n);
-    let mut svg = Svg::new(WIDTH, grid.height());
+    let mut svg = Svg::new(grid.width(), grid.height());
     for y in 0..n {
         for x in 0..=y {
             let area = grid.cell(y, x);
@@ -55,14 +55,23 @@ struct Grid {
 
 impl Grid {
     const GAP: f64 = 24.0;
+    /// Smallest side of a cell: more cells make the drawing wider than the page.
+    const SMALLEST: f64 = 132.0;
 
     /// The cells for `n` quantities.
     fn new(n: usize) -> Self {
         let most = if n <= 3 { 210.0 } else { 180.0 };
         let n_float = n.max(1) as f64;
-        let side = ((WIDTH - 80.0 - Self::GAP * (n_float - 1.0)) / n_float).min(most);
+        let side = (WIDTH - 80.0 - Self::GAP * (n_float - 1.0)) / n_float;
+        let side = side.clamp(Self::SMALLEST, most);
         let width = side * n_float + Self::GAP * (n_float - 1.0);
         Self { n, side, left: ((WIDTH - width) / 2.0).max(68.0) }
+    }
+
+    /// Width of the whole drawing.
+    fn width(&self) -> f64 {
+        let right = self.cell(0, self.n.max(1) - 1).right() + 12.0;
+        right.max(WIDTH)
     }
 
     /// Height of the whole drawing.

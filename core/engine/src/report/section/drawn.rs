@@ -1,13 +1,16 @@
 //! Responses at draws of the posterior, and the draws as the page's script takes them.
 
+use std::collections::BTreeMap;
+
 use maud::{Markup, PreEscaped, html};
 
 use super::{coordinate_unit, response_label, response_unit};
 use crate::page::chart::{Axis, Curve, Key, Panel, small_multiples};
-use crate::page::curves::Curves;
-use crate::page::scale::{extent, padded};
+use crate::page::curves::{CurvePanel, Curves};
+use crate::page::scale::{ShownUnit, extent, padded};
 use crate::page::{Caption, Numbers};
 use crate::report::findings::{DrawnResponses, Findings};
+use crate::stage::screen::Z975;
 use crate::stage::validate::ValidationFindings;
 
 /// Largest number of points of all drawn curves together.
@@ -26,7 +29,7 @@ pub fn figure(
     let outlines = Curves::of(&findings.layouts);
     let unit = response_unit(findings);
     let count = shown(drawn, &outlines);
-    let panel = |outline: &crate::page::curves::CurvePanel| {
+    let panel = |outline: &CurvePanel| {
         let draw = |(k, response): (usize, &Vec<f64>)| Curve {
             class: "s-draw",
             name: format!("draw {}", k + 1),
@@ -67,7 +70,7 @@ pub fn figure(
     let drawings = small_multiples(&panels, &x, &y, "responses at draws of the posterior");
     html! {
         (numbers.figure("posterior-draws", &drawings, &keys, &caption))
-        (data(findings, drawn, count))
+        (data(findings, validation, &outlines, (drawn, count)))
     }
 }
 
@@ -77,18 +80,55 @@ fn shown(drawn: &DrawnResponses, outlines: &Curves) -> usize {
     (MOST_POINTS / points.max(1)).max(FEWEST).min(drawn.responses.len())
 }
 
-/// The draws in displayed units, five digits of each, for the choice of a region of the pairs.
-fn data(findings: &Findings, drawn: &DrawnResponses, count: usize) -> Markup {
+/// The draws in displayed units, five digits of each, for the choice of a region of the pairs, and by panel what their
+/// residuals need.
+fn data(
+    findings: &Findings,
+    validation: &ValidationFindings,
+    outlines: &Curves,
+    (drawn, count): (&DrawnResponses, usize),
+) -> Markup {
     let Some(calibration) = &findings.calibration else { return html! {} };
     let values: Vec<Vec<f64>> = drawn.points[..count]
         .iter()
         .map(|point| {
             let each = point.iter().zip(&calibration.coordinates);
-            let shown = each.map(|(value, c)| coordinate_unit(c).show(*value));
-            shown.map(|v| format!("{v:.4e}").parse().unwrap_or(f64::NAN)).collect()
+            each.map(|(value, c)| five_digits(coordinate_unit(c).show(*value))).collect()
         })
         .collect();
-    // Numbers that are not finite become `null`. No text of the study is in it.
-    let text = serde_json::json!({ "values": values }).to_string();
+    let unit = response_unit(findings);
+    let panels = outlines.panels.iter();
+    let residuals: BTreeMap<&str, Vec<[f64; 3]>> = panels
+        .map(|outline| (outline.title.as_str(), compared(outline, validation, &unit)))
+        .collect();
+    // Numbers that are not finite become `null`.
+    let text = serde_json::json!({ "values": values, "residuals": residuals }).to_string();
+    // No text may end the script.
+    let text = text.replace('<', "\\u003c");
     html! { script type="application/json" id="draws" { (PreEscaped(text)) } }
+}
+
+fn five_digits(value: f64) -> f64 {
+    format!("{value:.4e}").parse().unwrap_or(f64::NAN)
+}
+
+/// Largest number of places of a panel at which residuals of draws are shown.
+const MOST_PLACES: usize = 240;
+
+/// Place, measured mean and standard deviation of a new replicate, in displayed units, where all are known.
+fn compared(
+    outline: &CurvePanel,
+    validation: &ValidationFindings,
+    unit: &ShownUnit,
+) -> Vec<[f64; 3]> {
+    let Some((low, high)) = &validation.predictive else { return Vec::new() };
+    let known = |&(at, i): &(f64, usize)| {
+        let &(replicates, mean, _) = validation.replicates.get(i)?;
+        let sd = (high.get(i)? - low.get(i)?) / (2.0 * Z975);
+        // The mean is not rounded: it may be far larger than the deviation.
+        let found = [five_digits(at), unit.show(mean), five_digits(unit.show(sd))];
+        (replicates > 0 && sd > 0.0 && found.iter().all(|v| v.is_finite())).then_some(found)
+    };
+    let stride = outline.places.len().div_ceil(MOST_PLACES).max(1);
+    outline.places.iter().step_by(stride).filter_map(known).collect()
 }

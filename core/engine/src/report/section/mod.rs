@@ -2,12 +2,15 @@
 
 pub mod banner;
 mod drawn;
+mod energy;
 mod ensemble;
 pub mod evidence;
 mod fields;
 mod forward;
 pub mod headline;
 mod intervals;
+mod left_out;
+mod main_effects;
 mod measurements;
 mod mixing;
 mod overview;

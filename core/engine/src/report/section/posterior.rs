@@ -1,5 +1,6 @@
 //! The posterior: summary table, correlation, marginals, pairs.
 
+use lacuna_linalg::Matrix;
 use maud::{Markup, html};
 
 use super::sampling::{kept_draws, marks};
@@ -268,42 +269,63 @@ fn sd_axis(findings: &Findings, variance_factor: f64) -> SecondAxis {
 }
 
 fn pairs(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
-    let columns: Vec<PairColumn> = calibration
-        .coordinates
-        .iter()
-        .enumerate()
-        .take(MOST_PAIRED)
-        .map(|(i, c)| {
-            let unit = coordinate_unit(c);
-            PairColumn {
-                label: unit.label(&titled(&c.name, &c.symbol)),
-                draws: kept_draws(calibration, i, &unit),
-                effective: c.ess_bulk,
-                marks: pair_marks(c, &unit),
-            }
-        })
-        .collect();
+    let chosen = paired(&calibration.correlation);
+    let column = |&i: &usize| {
+        let c = &calibration.coordinates[i];
+        let unit = coordinate_unit(c);
+        PairColumn {
+            index: i,
+            label: unit.label(&titled(&c.name, &c.symbol)),
+            draws: kept_draws(calibration, i, &unit),
+            effective: c.ess_bulk,
+            marks: pair_marks(c, &unit),
+        }
+    };
+    let columns: Vec<PairColumn> = chosen.iter().map(column).collect();
     let mut keys = vec![Key::area("hex h-4", "draws (darker: more)"), Key::line("m-map", "MAP")];
     if calibration.coordinates.iter().any(|c| c.reference.is_some()) {
         keys.push(Key::line("m-reference", "reference"));
     }
+    let all = calibration.coordinates.len();
+    let further = if all > chosen.len() {
+        format!(
+            " Of {all} coordinates the {} with the strongest correlations are shown.",
+            chosen.len()
+        )
+    } else {
+        String::new()
+    };
     let caption = Caption::new(
         format!(
             "The coordinates in pairs: counts of draws in hexagons, shaded by the root of the count, \
              with densities on the diagonal. The axes hold 99.9 % of the draws; crosses mark the MAP \
-             and, where it is that near, the reference.{}",
-            first_of(calibration.coordinates.len(), MOST_PAIRED)
+             and, where it is that near, the reference.{further}"
         ),
         "the posterior.",
         "narrow ridges, bananas, several islands.",
     );
-    numbers.figure("pairs", &[pair_matrix(&columns, &in_pairs(calibration))], &keys, &caption)
+    let said = in_pairs(calibration, &chosen);
+    numbers.figure("pairs", &[pair_matrix(&columns, &said)], &keys, &caption)
+}
+
+/// Coordinates that are shown in pairs: all, or those with the strongest correlations, in their order.
+fn paired(correlation: &Matrix) -> Vec<usize> {
+    let n = correlation.rows();
+    let strongest = |i: usize| {
+        let others = (0..n).filter(|&j| j != i).map(|j| correlation[(i, j)].abs());
+        others.filter(|size| size.is_finite()).fold(0.0, f64::max)
+    };
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| strongest(b).total_cmp(&strongest(a)));
+    order.truncate(MOST_PAIRED);
+    order.sort_unstable();
+    order
 }
 
 /// Description of the pairs: the strongest correlation among the coordinates that are drawn.
-fn in_pairs(calibration: &CalibrationFindings) -> String {
-    let n = calibration.coordinates.len().min(MOST_PAIRED);
-    let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
+fn in_pairs(calibration: &CalibrationFindings, chosen: &[usize]) -> String {
+    let pairs = chosen.iter().flat_map(|&i| chosen.iter().map(move |&j| (i, j)));
+    let pairs = pairs.filter(|(i, j)| j < i);
     let size = |&(i, j): &(usize, usize)| calibration.correlation[(i, j)].abs();
     let known = pairs.filter(|pair| size(pair).is_finite());
     match known.max_by(|a, b| size(a).total_cmp(&size(b))) {
@@ -352,4 +374,22 @@ fn fits(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
         "small p-values: then no named distribution stands in for the draws.",
     );
     html! { @if !table.is_empty() { (numbers.table(&table, &caption)) } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_many_coordinates_the_most_correlated_are_paired() {
+        let few = Matrix::from_fn(5, 5, |i, j| if i == j { 1.0 } else { 0.0 });
+        assert_eq!(paired(&few), [0, 1, 2, 3, 4]);
+        // Neighbours 2k, 2k + 1 are correlated, the later the stronger.
+        let many = Matrix::from_fn(20, 20, |i, j| match (i == j, i / 2 == j / 2) {
+            (true, _) => 1.0,
+            (_, true) => -0.04 * (i / 2) as f64,
+            _ => 0.0,
+        });
+        assert_eq!(paired(&many), (8..20).collect::<Vec<_>>());
+    }
 }

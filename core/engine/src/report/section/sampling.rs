@@ -3,7 +3,7 @@
 use lacuna::plugin::Fact;
 use maud::{Markup, html};
 
-use super::{coordinate_unit, fact_list, first_of, mixing, titled};
+use super::{coordinate_unit, energy, fact_list, first_of, mixing, titled};
 use crate::page::chart::{Axis, BarChart, BarSeries, Key, Level, Mark, Trace, traces};
 use crate::page::number::{count, percent, significant};
 use crate::page::scale::ShownUnit;
@@ -38,6 +38,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         @if !calibration.acceptance.is_empty() { (acceptance(calibration, numbers)) }
         @if !calibration.draws.is_empty() { (walkers(calibration, numbers)) }
         (mixing::figures(calibration, numbers))
+        @if let Some(energies) = &calibration.energies { (energy::figure(energies, numbers)) }
     };
     Some(Section { id: "sampling", title: "Sampling", content })
 }

@@ -4,7 +4,7 @@ use lacuna_linalg::Matrix;
 use maud::{Markup, html};
 
 use super::forward::LINES;
-use super::{fact_list, group_word, response_label, response_unit};
+use super::{fact_list, group_word, main_effects, response_label, response_unit};
 use crate::page::chart::{
     Axis, BarChart, BarSeries, Curve, Key, Panel, agreement, small_multiples,
 };
@@ -40,6 +40,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         (errors(findings, surrogate, numbers))
         @if !surrogate.pairs.is_empty() { (pairs(findings, surrogate, numbers)) }
         (errors_along(findings, surrogate, numbers))
+        (main_effects::figure(findings, surrogate, numbers))
         @if let Some(sobol) = &surrogate.sobol { (sensitivity(findings, sobol, numbers)) }
         @if let Some(total) = &surrogate.total_by_output { (sensitivity_along(findings, total, numbers)) }
     };

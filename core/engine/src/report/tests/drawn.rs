@@ -2,8 +2,8 @@
 
 use lacuna::data::Layout;
 
-use super::fixture::{MEAN, SD, SENSORS, measured, response};
-use crate::report::findings::{DrawnResponses, Mixing};
+use super::fixture::{MEAN, SD, SENSORS, measured, parameters, response};
+use crate::report::findings::{DrawnResponses, Energies, MainEffect, Mixing};
 use crate::stage::validate::{ValidationCase, ValidationFindings};
 
 /// Draws along a line through the posterior mean, with responses that shift with them.
@@ -28,6 +28,31 @@ pub fn mixing() -> Vec<Mixing> {
         autocorrelation: (0..=100).map(|lag| (lag, 0.95_f64.powi(lag as i32))).collect(),
     };
     (0..4).map(one).collect()
+}
+
+/// Energies of two chains, one of which hardly changes its own.
+pub fn energies() -> Energies {
+    let wave = |k: i32| (f64::from(k) * 0.7).sin() + 0.4 * (f64::from(k) * 0.11).cos();
+    let levels: Vec<f64> = (0..400).map(wave).collect();
+    let changes = levels.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    Energies { levels, changes, fractions: vec![0.9, 0.12] }
+}
+
+/// A bend, a rise and a flat line.
+pub fn main_effects() -> Vec<MainEffect> {
+    let one = |(i, parameter): (usize, lacuna::data::Parameter)| {
+        let share = |k: usize| k as f64 / 14.0;
+        let mean: Vec<f64> =
+            (0..15).map(|k| 1e-4 * [4.0 * (share(k) - 0.5).powi(2), share(k), 0.4][i]).collect();
+        MainEffect {
+            output: 20 * (i + 1),
+            values: (0..15).map(|k| parameter.design.quantile(0.02 + 0.96 * share(k))).collect(),
+            interval: mean.iter().map(|y| (y - 5e-5, y + 8e-5)).collect(),
+            mean,
+            parameter,
+        }
+    };
+    parameters().into_iter().enumerate().map(one).collect()
 }
 
 pub fn validation(layout: &Layout) -> ValidationFindings {

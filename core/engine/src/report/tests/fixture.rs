@@ -209,6 +209,7 @@ fn surrogate(layout: &Layout) -> SurrogateFindings {
             [0.1, 0.4, 0.6][j] + 1e-4 * i as f64
         })),
         sobol: Some(vec![(0.06, 0.11), (0.34, 0.43), (0.49, 0.61)]),
+        main_effects: super::drawn::main_effects(),
     }
 }
 
@@ -256,6 +257,7 @@ fn calibration() -> CalibrationFindings {
             limit: 0.67,
             count: 500,
             k_hat: (0..500).map(|i| 0.4 * (f64::from(i) * 0.7).sin() + 0.2).collect(),
+            below: (0..500).map(|i| ((f64::from(i) + 0.5) / 500.0).powf(1.2)).collect(),
             curves: Some(crate::report::findings::CurvesLeftOutFindings {
                 elpd: -1190.0,
                 error: 33.0,
@@ -279,6 +281,7 @@ fn calibration() -> CalibrationFindings {
             .into(),
         log_density: (98_211.42, 98_210.07),
         mixing: super::drawn::mixing(),
+        energies: Some(super::drawn::energies()),
         facts: vec![
             Fact::new("stretch", 2),
             Fact::new("log density evaluations", "144000 of the emulator, none of the simulator"),

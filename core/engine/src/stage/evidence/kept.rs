@@ -27,6 +27,9 @@ const LEFT_OUT: &str = "left_out.nc";
 const DATUM: &str = "";
 const CURVE: &str = "curve_";
 
+/// Array of the probabilities of values below the measured ones.
+const BELOW: &str = "below";
+
 impl Artifact for Weighed {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
         let header = Header {
@@ -40,6 +43,9 @@ impl Artifact for Weighed {
         let mut all = Vec::new();
         if let Some(loo) = &self.left_out {
             all.extend(columns(loo, DATUM, "datum"));
+        }
+        if !self.below.is_empty() {
+            all.push(by("datum", BELOW, self.below.clone()));
         }
         if let Some(loo) = &self.curves_left_out {
             all.extend(columns(loo, CURVE, "curve"));
@@ -62,6 +68,8 @@ impl Artifact for Weighed {
             evidence: header.evidence,
             left_out: header.left_out.then(|| left_out(folder)).transpose()?,
             curves_left_out: header.curves_left_out.then(|| read(&path, CURVE)).transpose()?,
+            // Studies whose simulated data are too many have none.
+            below: arrays::read(&path, BELOW).map(Array::into_values).unwrap_or_default(),
             by_curve: by_curve.transpose()?.map(Array::into_matrix),
             missing: header.missing,
         })
@@ -70,12 +78,8 @@ impl Artifact for Weighed {
 
 /// Arrays with one value per datum or curve; includes the curve of each datum if it is known.
 fn columns(loo: &LeaveOneOut, prefix: &str, dimension: &str) -> Vec<Array<'static>> {
-    let array = |name: &str, dimension: &str, values: Vec<f64>| Array {
-        name: format!("{prefix}{name}"),
-        dimensions: vec![(dimension.to_owned(), values.len())],
-        values: values.into(),
-        unit: None,
-    };
+    let array =
+        |name: &str, dimension: &str, values| by(dimension, &format!("{prefix}{name}"), values);
     let column = |name, value: fn(&Left) -> f64| {
         array(name, dimension, loo.data.iter().map(value).collect())
     };
@@ -89,6 +93,16 @@ fn columns(loo: &LeaveOneOut, prefix: &str, dimension: &str) -> Vec<Array<'stati
         columns.push(array("curve", dimension, loo.curve.iter().map(|&c| c as f64).collect()));
     }
     columns
+}
+
+/// An array with one value for each element of a dimension.
+fn by(dimension: &str, name: &str, values: Vec<f64>) -> Array<'static> {
+    Array {
+        name: name.to_owned(),
+        dimensions: vec![(dimension.to_owned(), values.len())],
+        values: values.into(),
+        unit: None,
+    }
 }
 
 fn read(path: &Path, prefix: &str) -> Result<LeaveOneOut, Stop> {

@@ -16,13 +16,12 @@ use serde_json::json;
 use super::calibrate::{Calibrated, Law, Parts};
 use super::derived;
 use super::evidence::Weighed;
-use super::predictions::Predicting;
+use super::predictions::{Predicting, Predictor};
 use super::quantities::Quantified;
 use super::validate::Validated;
 use crate::posterior::Posterior;
 use crate::stage::inverse_problem::InverseProblem;
 use crate::study::Study;
-use predicted::Predictor;
 
 /// Name of the file in the run directory.
 const NAME: &str = "posterior.nc";

@@ -1,25 +1,14 @@
 //! Contents of the file besides the draws: log-likelihoods, and data simulated from posterior and prior.
 
-use lacuna::data::Measurements;
-use lacuna::math::random::Stream;
-use lacuna::plugin::{Likelihood, Target};
+use lacuna::plugin::Target;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
-use rayon::prelude::*;
 
 use crate::posterior::Posterior;
 use crate::stage::calibrate::Calibrated;
-use crate::stage::predictions::{self, Chosen, Predicting};
+use crate::stage::predictions::{self, Chosen, Predictor};
 use crate::stage::{predict, stream};
 use crate::study::Study;
-
-/// Densities of the measured data, and a simulator of new ones.
-pub struct Predictor<'a> {
-    /// Densities of the measured data.
-    pub densities: Predicting<'a>,
-    /// Likelihood that simulates data around a response.
-    pub makes: &'a dyn Likelihood,
-}
 
 /// Draws from the prior, in natural units, one per row.
 pub struct FromPrior {
@@ -59,8 +48,7 @@ pub fn from_posterior(
     if let Some(reason) = p.densities.forward.failure() {
         return Err(Stop::new(reason));
     }
-    let random = stream(study, "posterior_predictive");
-    let data = simulated(p, &responses, &chosen.points, &random);
+    let data = predictions::simulated_from_posterior(study, p, &responses, &chosen.points);
     Ok(Some(FromPosterior { chosen, log_likelihood, data }))
 }
 
@@ -84,30 +72,7 @@ pub fn from_prior(
     let answered: Vec<usize> =
         (0..count).filter(|&i| responses[i].iter().all(|y| y.is_finite())).collect();
     let responses: Vec<Vec<f64>> = answered.iter().map(|&i| responses[i].clone()).collect();
-    let data = simulated(p, &responses, &first.select_rows(&answered), &random);
+    let data = predictions::simulated(p, &responses, &first.select_rows(&answered), &random);
     let data = (!answered.is_empty()).then_some((answered, data));
     Ok(FromPrior { points, data })
-}
-
-/// Simulated data, one set per row, in the order of the measured ones.
-fn simulated(
-    p: &Predictor<'_>,
-    responses: &[Vec<f64>],
-    points: &Matrix,
-    random: &Stream,
-) -> Matrix {
-    let (own, count) = (p.makes.hyperparameters().len(), p.densities.data.count());
-    let one = |(i, response): (usize, &Vec<f64>)| -> Vec<f64> {
-        let point = points.row(i);
-        let hyper = &point[point.len() - own..];
-        let blocks = p.makes.simulate(response, hyper, &random.named("data").at(i as u64));
-        let values = |block: &Measurements| -> Vec<f64> {
-            block.replicates.iter().flat_map(|r| r.values.iter().flatten()).copied().collect()
-        };
-        let all: Vec<f64> = blocks.iter().flat_map(values).collect();
-        // A failing discrepancy in a library reports its fault separately.
-        if all.len() == count { all } else { vec![f64::NAN; count] }
-    };
-    let rows: Vec<Vec<f64>> = responses.par_iter().enumerate().map(one).collect();
-    Matrix::from_rows(count, rows)
 }
