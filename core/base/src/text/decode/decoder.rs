@@ -2,7 +2,8 @@
 
 use serde::de::value::{StrDeserializer, StringDeserializer};
 use serde::de::{
-    DeserializeSeed, Deserializer, EnumAccess, MapAccess, SeqAccess, VariantAccess, Visitor,
+    DeserializeSeed, Deserializer, EnumAccess, Expected, MapAccess, SeqAccess, VariantAccess,
+    Visitor,
 };
 use serde::forward_to_deserialize_any;
 
@@ -194,7 +195,12 @@ impl<'de> Deserializer<'de> for Decoder<'_> {
     }
 
     fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
-        visitor.visit_map(self.table()?)
+        if let Value::Table(_) = self.node.value {
+            return visitor.visit_map(self.table()?);
+        }
+        // A visitor of its own says more than that of a map of any keys.
+        let said = (&visitor as &dyn Expected).to_string();
+        Err(self.wrong(if said == "a map" { "a table" } else { &said }))
     }
 
     fn deserialize_struct<V: Visitor<'de>>(
