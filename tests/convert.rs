@@ -60,7 +60,7 @@ fn the_table_of_measurements_is_read_back_to_the_same_bits() {
 fn what_has_no_draws_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (run, out, code, right) in [
-        (".", "draws.txt", 2, "`draws.txt` does not end in `.csv`"),
+        (".", "draws.txt", 2, "`draws.txt` ends neither in `.csv`"),
         ("nowhere", "draws.csv", 2, "`nowhere` is neither a run directory nor a study"),
         (".", "draws.csv", 1, ". has no draws"),
     ] {

@@ -16,6 +16,7 @@ mod dependencies;
 mod direct;
 mod docs;
 mod effects;
+mod emulator_file;
 mod events;
 mod falling_balls;
 mod faulty_tables;

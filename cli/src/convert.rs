@@ -1,4 +1,4 @@
-//! Command `convert`: the draws of a run, or the measurements of a study, as a table.
+//! Command `convert`: the draws of a run, or the measurements of a study, as a table; the emulator of a run as numbers.
 
 use std::path::Path;
 
@@ -6,10 +6,13 @@ use lacuna::data::{Coordinates, Layout, Replicate};
 use lacuna::plugin::reader::{MeasurementSource, Variable};
 use lacuna::plugin::{Reader, registry};
 use lacuna::run::{Stop, files};
+use lacuna_engine::serve;
 use lacuna_engine::study::Study;
+use lacuna_engine::study::resolve::Use;
+use lacuna_run::RunDirectory;
 
 use crate::study::{self, Settings};
-use crate::{misuse, print};
+use crate::{misuse, print, progress};
 
 /// File of a run directory with the draws.
 const DRAWS: &str = "posterior.nc";
@@ -22,10 +25,15 @@ struct Column {
 
 /// Runs `lacuna convert SOURCE OUT`.
 pub fn convert(source: &Path, settings: &Settings, out: &Path) -> anyhow::Result<()> {
+    if out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("nc")) {
+        return emulator(source, out);
+    }
     let is_csv = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
     if out != Path::new("-") && !is_csv {
-        let text =
-            format!("error: `{}` does not end in `.csv`, the format of the table", out.display());
+        let text = format!(
+            "error: `{}` ends neither in `.csv`, for a table, nor in `.nc`, for the emulator of a run",
+            out.display()
+        );
         return Err(misuse(text));
     }
     let text = if source.is_dir() {
@@ -45,6 +53,24 @@ pub fn convert(source: &Path, settings: &Settings, out: &Path) -> anyhow::Result
         return Ok(());
     }
     files::write_atomic(out, text.as_bytes())?;
+    print(&format!("wrote {}", out.display()));
+    Ok(())
+}
+
+/// Writes the emulator of a run.
+fn emulator(run: &Path, out: &Path) -> anyhow::Result<()> {
+    if !run.is_dir() {
+        let text = format!(
+            "error: `{}` is no run directory: the emulator in `{}` would be that of a run\nhelp: `lacuna convert RUN OUT.nc`",
+            run.display(),
+            out.display()
+        );
+        return Err(misuse(text));
+    }
+    let study = study::kept_study_for(run, Use::Look)?;
+    let mut directory = RunDirectory::open(run)?;
+    directory.look();
+    serve::export(&study, directory, &*progress::observer(), out)?;
     print(&format!("wrote {}", out.display()));
     Ok(())
 }

@@ -56,11 +56,12 @@ pub fn serve(
     interrupt::when_asked(move |_| stopper.stop())
         .map_err(|error| Stop::new(format!("cannot wait for Ctrl-C: {error}")))?;
     let answered = functions(&study, run, &*progress::observer(), |functions| {
-        for function in functions {
-            print(&described(*function));
+        let functions: Vec<_> = functions.iter().filter(|function| !function.is_local()).collect();
+        for function in &functions {
+            print(&described(**function));
         }
         print(&format!("listening at http://{}; Ctrl-C ends it", server.address()));
-        let bridged: Vec<Bridged<'_>> = functions.iter().map(|f| Bridged(*f)).collect();
+        let bridged: Vec<Bridged<'_>> = functions.iter().map(|f| Bridged(**f)).collect();
         let models: Vec<&dyn Model> = bridged.iter().map(|b| b as &dyn Model).collect();
         server.serve(&models, rayon::current_num_threads())
     })?;

@@ -84,6 +84,37 @@ class Run:
         """The model itself."""
         return Emulator(self._functions, "model")
 
+    def predict(self, points: Any = None, *, draws: int = 400, seed: int = 0) -> Predictive:
+        """Predict what a new replicate would measure: the response of the model with the study's effects, and the errors
+        of its discrepancy around it, with those of emulator and numerics.
+
+        Parameters
+        ----------
+        points
+            Values of all unknowns: a dictionary of numbers or arrays, or an array with the unknowns as columns. Default:
+            draws of the posterior, so that the prediction contains its uncertainty.
+        draws
+            Number of draws of the posterior, evenly spaced over all chains.
+        seed
+            Seed of the random numbers of the errors.
+
+        Raises
+        ------
+        ValueError
+            If the study has no measurements and discrepancy, or its likelihood is estimated or cut.
+        """
+        functions = self._functions
+        if points is None:
+            names = [name for name, _ in functions.variables("replicate")]
+            table = self.posterior.to_pandas()[names].to_numpy()
+            count = min(draws, len(table))
+            points = table[((2 * np.arange(count) + 1) * len(table)) // (2 * count)]
+        rows, single = _points(points, functions.variables("replicate"))
+        shape = _shape(functions, "replicate") if single else (len(rows), *_shape(functions, "replicate"))
+        response = functions.values("replicate", rows.tobytes())
+        replicate = functions.replicates("replicate", rows.tobytes(), seed)
+        return Predictive(*(np.frombuffer(table).reshape(shape) for table in (response, replicate)))
+
     @cached_property
     def _functions(self) -> _engine.Functions:
         return _engine.Functions(os.fspath(self.folder))
@@ -172,6 +203,36 @@ class Prediction:
     sd: np.ndarray | None
 
 
+@dataclass(frozen=True)
+class Predictive:
+    """Predictions of new replicates.
+
+    Attributes
+    ----------
+    response
+        Response at each point, with the study's effects and without errors; the points come first.
+    replicate
+        A new replicate at each point, alike: the response with random errors.
+    """
+
+    response: np.ndarray
+    replicate: np.ndarray
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Mean of the replicates over the points."""
+        return self.replicate.mean(axis=0)
+
+    @property
+    def sd(self) -> np.ndarray:
+        """Standard deviation of the replicates over the points."""
+        return self.replicate.std(axis=0)
+
+    def quantile(self, probability: float) -> np.ndarray:
+        """Quantile of the replicates over the points."""
+        return np.quantile(self.replicate, probability, axis=0)
+
+
 class Emulator:
     """A function from the parameters to the response: the surrogate of a run, or its model."""
 
@@ -187,9 +248,7 @@ class Emulator:
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the response: that of its axes, or the number of its values if the scenarios have different axes."""
-        if len(self.layouts) > 1:
-            return (self._functions.outputs(self._name),)
-        return tuple(_length(axis) for axis in self.layouts[0]["axes"])
+        return _shape(self._functions, self._name)
 
     def predict(self, points: Any) -> Prediction:
         """Predict the response at points.
@@ -226,6 +285,13 @@ class Emulator:
         if jacobian is None:
             raise ValueError(f"the {self._name} has no exact derivatives")
         return np.frombuffer(jacobian).reshape(*self.shape, len(self.parameters))
+
+
+def _shape(functions: _engine.Functions, name: str) -> tuple[int, ...]:
+    layouts = json.loads(functions.layouts)
+    if len(layouts) > 1:
+        return (functions.outputs(name),)
+    return tuple(_length(axis) for axis in layouts[0]["axes"])
 
 
 def _length(axis: Mapping[str, Any]) -> int:

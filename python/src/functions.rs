@@ -25,6 +25,8 @@ enum Asked {
     Values(Matrix),
     /// Standard deviations of the error at points.
     Deviations(Matrix),
+    /// New replicates at points, with random numbers of a seed.
+    Replicates(Matrix, u64),
     /// Derivative of each value by each variable at a point.
     Jacobian(Vec<f64>),
 }
@@ -111,6 +113,17 @@ impl Functions {
         points: &[u8],
     ) -> PyResult<Option<Bound<'py, PyBytes>>> {
         self.table(py, name, Asked::Deviations(self.points(name, points)?))
+    }
+
+    /// A new replicate at each point, one per row, with random numbers of a seed; `None` if the function has none.
+    fn replicates<'py>(
+        &self,
+        py: Python<'py>,
+        name: &str,
+        points: &[u8],
+        seed: u64,
+    ) -> PyResult<Option<Bound<'py, PyBytes>>> {
+        self.table(py, name, Asked::Replicates(self.points(name, points)?, seed))
     }
 
     /// Derivative of each value by each variable at a point, as bytes; `None` if they are not known exactly.
@@ -221,6 +234,7 @@ fn answer(function: &dyn Function, asked: &Asked) -> Answer {
     match asked {
         Asked::Values(points) => function.batch(points).map(Some).map_err(told),
         Asked::Deviations(points) => Ok(function.deviations(points)),
+        Asked::Replicates(points, seed) => function.replicates(points, *seed).map_err(told),
         Asked::Jacobian(point) => match function.derivatives() {
             Some(derivatives) => derivatives.jacobian(point, None).map(Some).map_err(told),
             None => Ok(None),

@@ -60,6 +60,29 @@ def test_the_emulator_is_the_line(finished):
         emulator.predict(np.zeros((3, 4)))
 
 
+def test_new_replicates_have_the_predictive_distribution_in_closed_form(finished, line):
+    run, _ = finished
+    mean, covariance = closed_form(line[1])
+    design = np.column_stack([np.ones_like(TIMES), TIMES])
+    of_parameters = np.einsum("ij,jk,ik->i", design, covariance, design)
+    draws = 4000
+    found = run.predict(draws=draws, seed=3)
+    assert found.response.shape == found.replicate.shape == (draws, 6)
+    # Errors are independent from draw to draw, the draws as many as their effective number.
+    independent = min(value["ess_bulk"] for value in run.summary["parameters"].values())
+    error = np.sqrt(NOISE**2 / draws + of_parameters / min(independent, draws))
+    assert np.all(np.abs(found.mean - design @ mean) < 4 * error)
+    np.testing.assert_allclose(found.sd, np.sqrt(of_parameters + NOISE**2), rtol=4 / np.sqrt(2 * draws) + 0.02)
+    low, high = found.quantile(0.025), found.quantile(0.975)
+    np.testing.assert_allclose(high - low, 2 * 1.96 * found.sd, rtol=0.1)
+
+    single = run.predict({"level0": 0.1, "rise": 0.3})
+    np.testing.assert_allclose(single.response, 0.1 + 0.3 * TIMES, atol=1e-9)
+    assert single.replicate.shape == (6,)
+    assert np.array_equal(run.predict(seed=1).replicate, run.predict(seed=1).replicate)
+    assert not np.array_equal(run.predict(seed=1).replicate, run.predict(seed=2).replicate)
+
+
 def test_a_run_tells_its_progress_and_is_reused(finished, study):
     run, events = finished
     stages = [event[1] for event in events if event[0] == "begin"]

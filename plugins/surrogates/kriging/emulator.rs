@@ -1,7 +1,7 @@
 //! Gaussian processes over the components of the outputs.
 
 use lacuna::plugin::forward::Linear;
-use lacuna::plugin::surrogate::{FitError, Processes};
+use lacuna::plugin::surrogate::{FitError, Processes, Tables};
 use lacuna::plugin::{Emulator, Fact, Forward};
 use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, multiply, transposed_multiply};
@@ -256,6 +256,10 @@ impl Emulator for Kriging {
             self.fit_error.residuals.as_slice(),
         ];
         bytes::write_as(self.plugin, &header, &numbers)
+    }
+
+    fn tables(&self) -> Result<Tables, String> {
+        self.numbers()
     }
 }
 

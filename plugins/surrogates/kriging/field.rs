@@ -178,6 +178,12 @@ impl Field {
         precisions.iter().enumerate().map(square).sum::<f64>() / n
     }
 
+    /// Weights of the correlations with the runs (`components x runs`) and coefficients of the trend (`components x
+    /// terms`).
+    pub fn weights(&self) -> (&Matrix, &Matrix) {
+        (&self.alpha, &self.beta)
+    }
+
     /// Variance of the process of each component.
     pub fn variances(&self) -> &[f64] {
         &self.variances

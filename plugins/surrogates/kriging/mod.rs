@@ -11,6 +11,7 @@ mod regressors;
 mod scoring;
 mod search;
 mod standard;
+mod tables;
 
 #[cfg(test)]
 mod tests;

@@ -32,6 +32,11 @@ impl Standard {
         Err(format!("the design of parameter `{}`, {design}, has no width", parameter.name))
     }
 
+    /// Returns 1 if `x` is a logarithm and 0 otherwise, the centre, and the width.
+    pub fn closed(&self) -> [f64; 3] {
+        [f64::from(u8::from(self.logarithm)), self.centre, self.width]
+    }
+
     /// Returns the standard variable at a value of the parameter.
     pub fn at(&self, x: f64) -> f64 {
         // Values outside the support of a positive distribution are replaced by the smallest positive number.

@@ -154,6 +154,22 @@ impl Coordinate {
         (self.map, self.recurrence)
     }
 
+    /// Returns the standard variable in closed form: 1 for a logarithm or else 0, centre, scale, and bound.
+    ///
+    /// # Errors
+    /// The reason if it is that of a transformed distribution.
+    pub fn closed(&self) -> Result<[f64; 4], String> {
+        match &self.map {
+            Map::Affine { centre, scale } => Ok([0.0, *centre, *scale, f64::INFINITY]),
+            Map::Logarithm { centre, scale, bound } => Ok([1.0, *centre, *scale, *bound]),
+            Map::Probability { design, .. } => Err(format!(
+                "{} polynomials of a parameter with the design {design} are those of a transformed variable; with \
+                 `basis = \"auto\"` they are not",
+                self.family.name()
+            )),
+        }
+    }
+
     /// Returns the family of the polynomials.
     pub fn family(&self) -> Family {
         self.family

@@ -1,7 +1,7 @@
 //! The fitted expansion.
 
 use lacuna::plugin::forward::{Linear, SumOfSquares};
-use lacuna::plugin::surrogate::{FitError, Sensitivity};
+use lacuna::plugin::surrogate::{FitError, Sensitivity, Tables};
 use lacuna::plugin::{Emulator, Fact, Forward};
 use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, multiply, transposed_multiply};
@@ -12,7 +12,7 @@ use super::options::{Selection, Solver};
 use super::sparse::Sparse;
 use super::squares::Squares;
 use super::terms::{Basis, Terms};
-use super::{bytes, sensitivity};
+use super::{bytes, sensitivity, tables};
 
 /// A polynomial chaos expansion of all outputs over the union of their terms.
 #[derive(Debug, Clone, PartialEq)]
@@ -208,6 +208,13 @@ impl Emulator for Expansion {
             self.fit_error.residuals.as_slice(),
         ];
         bytes::write(&header, &numbers)
+    }
+
+    fn tables(&self) -> Result<Tables, String> {
+        let mut all = Tables::default();
+        tables::add_basis(&self.basis, &mut all)?;
+        all.matrix("coefficient", "term", "output", &self.coefficients);
+        Ok(all)
     }
 }
 

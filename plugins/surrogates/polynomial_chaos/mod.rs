@@ -32,6 +32,7 @@ mod sparse;
 mod squares;
 mod subspace_pursuit;
 mod sum;
+mod tables;
 mod terms;
 mod trend;
 
@@ -55,6 +56,7 @@ pub use family::Family;
 pub(super) use fit::check_numbers;
 pub use options::{Degree, DegreeRange, EarlyStop, QNorm, QNormRange, Selection, Solver};
 pub use recurrence::Recurrence;
+pub use tables::add_basis;
 pub use terms::{Basis, Nested, Sets, TermSet, Terms, Truncation};
 
 /// A polynomial chaos expansion: each output is a sum of products of orthonormal polynomials in the parameters.

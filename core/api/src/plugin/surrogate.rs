@@ -89,6 +89,57 @@ pub trait Emulator: Forward {
 
     /// Serialises the emulator, for [`Surrogate::load`].
     fn save(&self) -> Result<Vec<u8>, Stop>;
+
+    /// The emulator's mean as numbers from which a program without this plugin can compute it.
+    ///
+    /// # Errors
+    /// The reason why it has no such form, as a clause such as `its polynomials are those of another variable`.
+    fn tables(&self) -> Result<Tables, String> {
+        Err("its plugin states no tables".to_owned())
+    }
+}
+
+/// Numbers of an emulator, which a file carries to other programs. Names, dimensions and formulas are those of
+/// `docs/emulator_file.md`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tables {
+    /// Indices of the parameters on which the response depends, in the order of the arrays; empty for all.
+    pub parameters: Vec<usize>,
+    /// Texts, such as the name of a kernel.
+    pub texts: Vec<(String, String)>,
+    /// Arrays of numbers.
+    pub arrays: Vec<Table>,
+}
+
+/// A named array of an emulator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// Name of the array.
+    pub name: String,
+    /// Name and length of each dimension, slowest-varying first.
+    pub dimensions: Vec<(String, usize)>,
+    /// Values, row-major.
+    pub values: Vec<f64>,
+}
+
+impl Tables {
+    /// Adds a column of numbers.
+    pub fn column(&mut self, name: &str, dimension: &str, values: Vec<f64>) {
+        let dimensions = vec![(dimension.to_owned(), values.len())];
+        self.arrays.push(Table { name: name.to_owned(), dimensions, values });
+    }
+
+    /// Adds a matrix, with names for its rows and columns.
+    pub fn matrix(&mut self, name: &str, rows: &str, columns: &str, matrix: &Matrix) {
+        self.arrays.push(Table {
+            name: name.to_owned(),
+            dimensions: vec![
+                (rows.to_owned(), matrix.rows()),
+                (columns.to_owned(), matrix.columns()),
+            ],
+            values: matrix.as_slice().to_vec(),
+        });
+    }
 }
 
 /// Errors of an emulator as a sum over components, `e(x) = Σ t_c(x) l_c`, with independent Gaussian processes `t_c` of mean

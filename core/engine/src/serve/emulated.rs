@@ -35,6 +35,16 @@ impl<'a> Emulated<'a> {
         Ok(Some(Self { study, emulator, region, parts: parts(study), deviations }))
     }
 
+    /// Interval of each parameter in which it was fitted.
+    pub(super) fn region(&self) -> &[(f64, f64)] {
+        &self.region
+    }
+
+    /// Standard deviation of the error of each output over the prior.
+    pub(super) fn over_prior(&self) -> &[f64] {
+        &self.deviations
+    }
+
     /// Rejects points outside the region of the fit, where the emulator is not valid.
     fn inside(&self, point: &[f64]) -> Result<(), EvalError> {
         for ((x, (low, high)), p) in point.iter().zip(&self.region).zip(&self.study.parameters) {

@@ -2,6 +2,8 @@
 //!
 //! - `model`: the study's simulator, from the parameters to the response;
 //! - `emulator`: the surrogate of a finished run, from the parameters to the response;
+//! - `replicate`: from all unknowns to the response with the study's effects, and new replicates around it; for programs
+//!   in the same process alone;
 //! - `posterior`: the log density of parameters and hyperparameters given the measurements of a finished run, or of a
 //!   study with a target.
 //!
@@ -9,8 +11,10 @@
 
 mod curvature;
 mod emulated;
+mod exported;
 mod finished;
 mod posterior;
+mod replicated;
 mod simulated;
 #[cfg(test)]
 mod tests;
@@ -35,10 +39,12 @@ use crate::stage::inverse_problem::InverseProblem;
 use crate::study::Study;
 use emulated::Emulated;
 use posterior::LogPosterior;
+use replicated::Replicated;
 use simulated::Simulated;
 use watched::Watched;
 
 pub use curvature::curvature;
+pub use exported::export;
 pub use finished::finished;
 
 /// A function of a study's unknowns.
@@ -75,6 +81,16 @@ pub trait Function: Sync {
     /// Standard deviation of the error of each value at each point, `points x values`, if it is known.
     fn deviations(&self, _points: &Matrix) -> Option<Matrix> {
         None
+    }
+
+    /// A new replicate at each point, `points x values`, with random numbers of this seed, if the function has any.
+    fn replicates(&self, _points: &Matrix, _seed: u64) -> Result<Option<Matrix>, EvalError> {
+        Ok(None)
+    }
+
+    /// True if the function is of use in this process alone.
+    fn is_local(&self) -> bool {
+        false
     }
 
     /// Derivatives of the function, if they are known exactly.
@@ -195,12 +211,15 @@ fn of_run<R>(
     let (Some(measured), Some(_)) = (measured, &study.discrepancy) else {
         return Ok(act(&all));
     };
+    let parts = Parts::of(study, measured, problem)?;
+    let posterior = LogPosterior::of(parts.posterior(study, problem));
+    let law = Parts::predicting(study, measured, problem)?;
+    let replicate = Replicated::new(study, problem.forward(), law, posterior.variables());
+    all.push(&replicate);
     // With populations the log density of the members themselves has no maximum, and no coordinates are those of others.
     if study.has_populations() {
         return Ok(act(&all));
     }
-    let parts = Parts::of(study, measured, problem)?;
-    let posterior = LogPosterior::of(parts.posterior(study, problem));
     all.push(&posterior);
     Ok(act(&all))
 }

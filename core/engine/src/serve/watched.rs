@@ -58,6 +58,14 @@ impl Function for Watched<'_> {
         self.function.deviations(points)
     }
 
+    fn replicates(&self, points: &Matrix, seed: u64) -> Result<Option<Matrix>, EvalError> {
+        self.sound(self.function.replicates(points, seed))
+    }
+
+    fn is_local(&self) -> bool {
+        self.function.is_local()
+    }
+
     fn derivatives(&self) -> Option<&dyn Derivatives> {
         self.function.derivatives().map(|_| self as &dyn Derivatives)
     }

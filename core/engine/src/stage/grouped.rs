@@ -8,7 +8,7 @@ mod numerics;
 mod runs;
 
 use lacuna::plugin::forward::Linear;
-use lacuna::plugin::surrogate::{FitError, Indices};
+use lacuna::plugin::surrogate::{FitError, Indices, Tables};
 use lacuna::plugin::{Emulator, Fact, Forward, Sensitivity};
 use lacuna::run::{Stop, files};
 use lacuna_linalg::Matrix;
@@ -265,6 +265,10 @@ impl Emulator for Grouped {
 
     fn save(&self) -> Result<Vec<u8>, Stop> {
         self.emulator.save()
+    }
+
+    fn tables(&self) -> Result<Tables, String> {
+        Err("each group has parameters of its own, which share one emulator".to_owned())
     }
 }
 

@@ -5,7 +5,7 @@
 
 use lacuna::data::Parameter;
 use lacuna::plugin::forward::{Linear, SumOfSquares};
-use lacuna::plugin::surrogate::{FitError, Indices, Processes};
+use lacuna::plugin::surrogate::{FitError, Indices, Processes, Tables};
 use lacuna::plugin::{Emulator, Fact, Forward, Sensitivity};
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
@@ -193,6 +193,10 @@ impl Emulator for Widened {
 
     fn save(&self) -> Result<Vec<u8>, Stop> {
         self.emulator.save()
+    }
+
+    fn tables(&self) -> Result<Tables, String> {
+        Ok(Tables { parameters: self.used.indices.clone(), ..self.emulator.tables()? })
     }
 }
 

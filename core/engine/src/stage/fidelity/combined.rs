@@ -1,7 +1,7 @@
 //! A weighted sum of emulators as one emulator.
 
 use lacuna::plugin::forward::Linear;
-use lacuna::plugin::surrogate::{FitError, Processes, Summand};
+use lacuna::plugin::surrogate::{FitError, Processes, Summand, Tables};
 use lacuna::plugin::{Emulator, Fact, Forward, Sensitivity, Surrogate};
 use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, multiply};
@@ -254,5 +254,12 @@ impl Emulator for Combined {
 
     fn save(&self) -> Result<Vec<u8>, Stop> {
         Ok(self.saved.clone())
+    }
+
+    fn tables(&self) -> Result<Tables, String> {
+        match &self.form {
+            Form::One(emulator) => emulator.tables(),
+            Form::Several(_) => Err("it is the sum of emulators of two fidelities".to_owned()),
+        }
     }
 }
