@@ -1,6 +1,8 @@
 //! `lacuna convert`: the table of the draws against `summary.json`.
 
 use std::fs;
+use std::path::Path;
+use std::process::Command;
 
 use lacuna::plugin::reader::MeasurementSource;
 
@@ -33,6 +35,63 @@ fn the_table_of_draws_has_the_means_of_the_summary() {
     }
     let printed = quick::command().args(["convert"]).arg(&out).arg("-").output().unwrap();
     assert_eq!(String::from_utf8(printed.stdout).unwrap().trim_end(), text.trim_end());
+    same_in_parquet(&out, &table);
+}
+
+/// Compares a Parquet file with a table in CSV: names, units, types, texts, and the bits of every number.
+const COMPARE: &str = r#"
+import csv, struct, sys
+import pyarrow.parquet as pq
+table = pq.read_table(sys.argv[1])
+head, *rows = csv.reader(open(sys.argv[2], newline=""))
+units = {k.decode(): v.decode() for k, v in table.schema.metadata.items()}
+assert units.pop("lacuna") == sys.argv[3]
+split = lambda h: h[:-1].split(" [", 1) if h.endswith("]") else [h]
+assert table.schema.names == [split(h)[0] for h in head], table.schema.names
+assert units == {"unit:" + split(h)[0]: split(h)[1] for h in head if len(split(h)) == 2}, units
+assert table.num_rows == len(rows) > 0
+bits = lambda x: struct.pack("<d", x)
+for j, column in enumerate(table.columns):
+    kind, cells = str(column.type), [row[j] for row in rows]
+    if kind == "int64":
+        assert column.to_pylist() == [int(c) for c in cells], head[j]
+    elif kind == "double":
+        for found, cell in zip(column.to_pylist(), cells):
+            assert (found is None) if cell == "" else bits(found) == bits(float(cell)), (head[j], found, cell)
+    else:
+        assert kind == "string" and column.to_pylist() == cells, (head[j], kind)
+print([str(t) for t in table.schema.types])
+"#;
+
+/// Converts to Parquet and compares with the table in CSV; returns the types of the columns, as Arrow calls them.
+fn same_in_parquet(source: &Path, csv: &Path) -> Option<String> {
+    let out = csv.with_extension("parquet");
+    let done = quick::command().arg("convert").args([source, &out]).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let python = crate::python::interpreter("pyarrow")?;
+    let mut command = Command::new(python);
+    command.args(["-c", COMPARE]).args([&out, csv]).arg(env!("CARGO_PKG_VERSION"));
+    let done = command.output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    Some(String::from_utf8(done.stdout).unwrap())
+}
+
+#[test]
+fn a_table_of_measurements_in_parquet_has_texts_and_missing_values() {
+    let folder = quick::tables();
+    let study = folder.path().join("study.toml");
+    let measured = folder.path().join("measured.csv");
+    let text = fs::read_to_string(&measured).unwrap();
+    let first = text.lines().nth(1).unwrap();
+    let blank = format!("{},", first.rsplit_once(',').unwrap().0);
+    quick::replace(&measured, first, &blank);
+    let table = folder.path().join("long.csv");
+    let done = quick::command().arg("convert").args([&study, &table]).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(fs::read_to_string(&table).unwrap().lines().any(|line| line.ends_with(',')));
+    if let Some(types) = same_in_parquet(&study, &table) {
+        assert_eq!(types.trim(), "['string', 'double', 'double']");
+    }
 }
 
 #[test]
@@ -60,7 +119,8 @@ fn the_table_of_measurements_is_read_back_to_the_same_bits() {
 fn what_has_no_draws_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (run, out, code, right) in [
-        (".", "draws.txt", 2, "`draws.txt` ends neither in `.csv`"),
+        (".", "draws.txt", 2, "`draws.txt` ends in none of `.csv` and `.parquet`"),
+        (".", "draws.parquet", 1, ". has no draws"),
         ("nowhere", "draws.csv", 2, "`nowhere` is neither a run directory nor a study"),
         (".", "draws.csv", 1, ". has no draws"),
     ] {

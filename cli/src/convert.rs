@@ -1,5 +1,9 @@
 //! Command `convert`: the draws of a run, or the measurements of a study, as a table; the emulator of a run as numbers.
 
+mod parquet;
+mod table;
+mod thrift;
+
 use std::path::Path;
 
 use lacuna::data::{Coordinates, Layout, Replicate};
@@ -11,16 +15,18 @@ use lacuna_engine::study::Study;
 use lacuna_engine::study::resolve::Use;
 use lacuna_run::RunDirectory;
 
+use self::table::{Cells, Column};
 use crate::study::{self, Settings};
 use crate::{misuse, print, progress};
 
 /// File of a run directory with the draws.
 const DRAWS: &str = "posterior.nc";
 
-/// A column of the table: heading and numbers, one per draw.
-struct Column {
-    heading: String,
-    values: Vec<f64>,
+/// A format of the table.
+#[derive(Clone, Copy)]
+enum Format {
+    Csv,
+    Parquet,
 }
 
 /// Runs `lacuna convert SOURCE OUT`.
@@ -28,15 +34,8 @@ pub fn convert(source: &Path, settings: &Settings, out: &Path) -> anyhow::Result
     if out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("nc")) {
         return emulator(source, out);
     }
-    let is_csv = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-    if out != Path::new("-") && !is_csv {
-        let text = format!(
-            "error: `{}` ends neither in `.csv`, for a table, nor in `.nc`, for the emulator of a run",
-            out.display()
-        );
-        return Err(misuse(text));
-    }
-    let text = if source.is_dir() {
+    let format = format_of(out)?;
+    let columns = if source.is_dir() {
         draws(source)?
     } else if source.extension().is_some_and(|extension| extension == "toml") {
         measurements(&study::load(source, settings)?)?
@@ -49,10 +48,17 @@ pub fn convert(source: &Path, settings: &Settings, out: &Path) -> anyhow::Result
         return Err(misuse(text));
     };
     if out == Path::new("-") {
-        print(text.trim_end());
+        print(table::csv(&columns).trim_end());
         return Ok(());
     }
-    files::write_atomic(out, text.as_bytes())?;
+    let bytes = match format {
+        Format::Csv => table::csv(&columns).into_bytes(),
+        Format::Parquet => {
+            table::with_names_of_their_own(&columns)?;
+            parquet::file(&columns)
+        }
+    };
+    files::write_atomic(out, &bytes)?;
     print(&format!("wrote {}", out.display()));
     Ok(())
 }
@@ -75,8 +81,24 @@ fn emulator(run: &Path, out: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The format that the name of a file asks for; CSV for the terminal.
+fn format_of(out: &Path) -> anyhow::Result<Format> {
+    let ends = |end: &str| out.extension().is_some_and(|own| own.eq_ignore_ascii_case(end));
+    if out == Path::new("-") || ends("csv") {
+        return Ok(Format::Csv);
+    }
+    if ends("parquet") {
+        return Ok(Format::Parquet);
+    }
+    let text = format!(
+        "error: `{}` ends in none of `.csv` and `.parquet`, the formats of the table, and `.nc`, that of an emulator",
+        out.display()
+    );
+    Err(misuse(text))
+}
+
 /// The draws of a run.
-fn draws(run: &Path) -> anyhow::Result<String> {
+fn draws(run: &Path) -> anyhow::Result<Vec<Column>> {
     let path = run.join(DRAWS);
     if !path.is_file() {
         let stop = Stop::new(format!("{} has no draws", run.display()));
@@ -86,11 +108,11 @@ fn draws(run: &Path) -> anyhow::Result<String> {
     }
     let reader = registry::from_text::<dyn Reader>("hdf5", "").map_err(misuse)?.plugin;
     let contents = reader.inspect(&path).map_err(Stop::from)?;
-    Ok(table(&columns(&path, &contents.variables)?))
+    Ok(columns_of_draws(&path, &contents.variables)?)
 }
 
 /// The measurements of a study in the long form that the reader `csv` reads, converted to the units of the study.
-fn measurements(study: &Study) -> Result<String, Stop> {
+fn measurements(study: &Study) -> Result<Vec<Column>, Stop> {
     let section = study
         .measurements
         .as_ref()
@@ -109,74 +131,112 @@ fn measurements(study: &Study) -> Result<String, Stop> {
                 stop.help("take `covariance` out of the section, and name it beside the table")
             );
         }
-        parts.push((label.map(str::to_owned), layout, data.replicates));
+        parts.push(Part { label: label.map(str::to_owned), layout, replicates: data.replicates });
     }
-    let Some((label, first, _)) = parts.first() else {
+    columns_of_measurements(&parts)
+}
+
+/// The measurements of one scenario.
+struct Part {
+    label: Option<String>,
+    layout: Layout,
+    replicates: Vec<Replicate>,
+}
+
+impl Part {
+    /// Number of rows: a replicate has one for each value of the response, a missing one too.
+    fn rows(&self) -> impl Iterator<Item = (&Replicate, usize)> {
+        self.replicates.iter().flat_map(|r| (0..r.values.len()).map(move |flat| (r, flat)))
+    }
+
+    /// Names and units of the axes.
+    fn headings(&self) -> Vec<(&str, Option<String>)> {
+        let unit = |coordinates: &Coordinates| match coordinates {
+            Coordinates::Labels(_) => None,
+            Coordinates::Grid { unit, .. } => Some(unit.to_string()),
+        };
+        self.layout.axes.iter().map(|a| (a.name.as_str(), unit(&a.coordinates))).collect()
+    }
+}
+
+fn columns_of_measurements(parts: &[Part]) -> Result<Vec<Column>, Stop> {
+    let Some(first) = parts.first() else {
         return Err(Stop::new("nothing was measured in the scenarios of the study"));
     };
-    let sigma = parts.iter().any(|(.., replicates)| replicates.iter().any(|r| r.sd.is_some()));
-    let mut headings = Vec::new();
-    headings.extend(label.as_ref().map(|_| "scenario".to_owned()));
-    headings.push("replicate".to_owned());
-    for axis in &first.axes {
-        headings.push(match &axis.coordinates {
-            Coordinates::Labels(_) => axis.name.clone(),
-            Coordinates::Grid { unit, .. } => format!("{} [{unit}]", axis.name),
+    let headings = first.headings();
+    if let Some(other) = parts.iter().find(|part| part.headings() != headings) {
+        let name = other.label.as_deref().unwrap_or_default();
+        let text =
+            format!("scenario `{name}` has other axes than the first, and a table has one set");
+        return Err(Stop::new(text));
+    }
+    let texts = |text: &dyn Fn(&Part, &Replicate) -> String| {
+        let rows = parts.iter().flat_map(|part| part.rows().map(move |row| (part, row)));
+        Cells::Texts(rows.map(|(part, (replicate, _))| text(part, replicate)).collect())
+    };
+    let column =
+        |name: &str, unit: Option<String>, cells| Column { name: name.into(), unit, cells };
+    let mut columns = Vec::new();
+    if first.label.is_some() {
+        let labels = texts(&|part, _| part.label.clone().unwrap_or_default());
+        columns.push(column("scenario", None, labels));
+    }
+    columns.push(column("replicate", None, texts(&|_, replicate| replicate.name.clone())));
+    for (i, (name, unit)) in headings.into_iter().enumerate() {
+        columns.push(column(name, unit, coordinates(parts, i)));
+    }
+    let numbers = |of: &dyn Fn(&Replicate, usize) -> Option<f64>| {
+        let rows = parts.iter().flat_map(Part::rows);
+        Cells::Numbers(rows.map(|(replicate, flat)| of(replicate, flat)).collect())
+    };
+    let layout = &first.layout;
+    let values = numbers(&|replicate, flat| replicate.values[flat]);
+    columns.push(column(&layout.name, Some(layout.unit.to_string()), values));
+    if parts.iter().any(|part| part.replicates.iter().any(|replicate| replicate.sd.is_some())) {
+        let sigma = numbers(&|replicate, flat| {
+            replicate.values[flat].and_then(|_| replicate.sd.as_ref().map(|sd| sd[flat]))
         });
+        columns.push(column("sigma", Some(layout.unit.difference().to_string()), sigma));
     }
-    headings.push(format!("{} [{}]", first.name, first.unit));
-    headings.extend(sigma.then(|| format!("sigma [{}]", first.unit.difference())));
-    let mut text = line(&headings);
-    for (label, layout, replicates) in &parts {
-        for replicate in replicates {
-            rows(&mut text, label.as_deref(), layout, replicate, sigma);
-        }
-    }
-    Ok(text)
+    Ok(columns)
 }
 
-/// Adds the rows of a replicate; a missing value is a blank.
-fn rows(
-    text: &mut String,
-    label: Option<&str>,
-    layout: &Layout,
-    replicate: &Replicate,
-    sigma: bool,
-) {
-    for (flat, value) in replicate.values.iter().enumerate() {
-        let mut cells: Vec<String> = label.map(str::to_owned).into_iter().collect();
-        cells.push(replicate.name.clone());
-        let place = layout.place(flat);
-        cells.extend(layout.axes.iter().zip(place).map(|(axis, i)| match &axis.coordinates {
+/// Label or number along an axis of each row.
+fn coordinates(parts: &[Part], axis: usize) -> Cells {
+    let places = parts.iter().flat_map(|part| {
+        part.rows().map(move |(_, flat)| {
+            (&part.layout.axes[axis].coordinates, part.layout.place(flat)[axis])
+        })
+    });
+    let is_label = matches!(parts[0].layout.axes[axis].coordinates, Coordinates::Labels(_));
+    if is_label {
+        let label = |(coordinates, i): (&Coordinates, usize)| match coordinates {
             Coordinates::Labels(labels) => labels[i].clone(),
             Coordinates::Grid { values, .. } => values[i].to_string(),
-        }));
-        cells.push(value.map_or(String::new(), |y| y.to_string()));
-        if sigma {
-            let sd = replicate.sd.as_ref().filter(|_| value.is_some()).map(|sd| sd[flat]);
-            cells.push(sd.map_or(String::new(), |sd| sd.to_string()));
-        }
-        text.push_str(&line(&cells));
+        };
+        return Cells::Texts(places.map(label).collect());
     }
-}
-
-fn line(cells: &[String]) -> String {
-    let cells: Vec<String> = cells.iter().map(|cell| crate::inspect::quoted(cell)).collect();
-    cells.join(",") + "\n"
+    let number = |(coordinates, i): (&Coordinates, usize)| match coordinates {
+        Coordinates::Labels(_) => None,
+        Coordinates::Grid { values, .. } => Some(values[i]),
+    };
+    Cells::Numbers(places.map(number).collect())
 }
 
 /// The columns of the table: number of chain and draw, the unknowns, the log density.
-fn columns(path: &Path, variables: &[Variable]) -> Result<Vec<Column>, Stop> {
+fn columns_of_draws(path: &Path, variables: &[Variable]) -> Result<Vec<Column>, Stop> {
     let missing = |name: &str| Stop::new(format!("{} has no numbers `{name}`", path.display()));
     let find = |name: &str| variables.iter().find(|v| v.name == name);
     let coordinate = |name: &str| find(name).map(flat).ok_or_else(|| missing(name));
     let (chain, draw) = (coordinate("posterior/chain")?, coordinate("posterior/draw")?);
     let count = chain.len() * draw.len();
     let of_draw = |i: usize| (chain[i / draw.len()], draw[i % draw.len()]);
-    let mut columns = vec![
-        Column { heading: "chain".into(), values: (0..count).map(|i| of_draw(i).0).collect() },
-        Column { heading: "draw".into(), values: (0..count).map(|i| of_draw(i).1).collect() },
-    ];
+    let numbers = |name: &str, of: &dyn Fn(usize) -> f64| Column {
+        name: name.to_owned(),
+        unit: None,
+        cells: Cells::Integers((0..count).map(|i| of(i) as i64).collect()),
+    };
+    let mut columns = vec![numbers("chain", &|i| of_draw(i).0), numbers("draw", &|i| of_draw(i).1)];
     let log_density = find("sample_stats/lp").ok_or_else(|| missing("sample_stats/lp"))?;
     let unknowns = variables.iter().filter(|v| v.name.starts_with("posterior/"));
     for variable in unknowns.chain([log_density]) {
@@ -190,11 +250,12 @@ fn columns(path: &Path, variables: &[Variable]) -> Result<Vec<Column>, Stop> {
             return Err(missing(&variable.name));
         }
         let name = variable.name.rsplit('/').next().unwrap_or_default();
-        let unit = variable.unit.as_ref().map_or(String::new(), |unit| format!(" [{unit}]"));
+        let unit = variable.unit.as_ref().map(ToString::to_string);
         for part in 0..parts {
             let index = if parts == 1 { String::new() } else { format!(" {}", part + 1) };
-            let values = values.iter().skip(part).step_by(parts).copied().collect();
-            columns.push(Column { heading: format!("{name}{index}{unit}"), values });
+            let cells = values.iter().skip(part).step_by(parts).copied().map(Some).collect();
+            let (name, unit) = (format!("{name}{index}"), unit.clone());
+            columns.push(Column { name, unit, cells: Cells::Numbers(cells) });
         }
     }
     Ok(columns)
@@ -203,15 +264,4 @@ fn columns(path: &Path, variables: &[Variable]) -> Result<Vec<Column>, Stop> {
 /// All numbers of a variable, the last axis fastest.
 fn flat(variable: &Variable) -> Vec<f64> {
     variable.signals.columns.iter().flat_map(|column| column.values.iter().copied()).collect()
-}
-
-fn table(columns: &[Column]) -> String {
-    let headings: Vec<String> =
-        columns.iter().map(|c| crate::inspect::quoted(&c.heading)).collect();
-    let mut text = headings.join(",") + "\n";
-    for i in 0..columns.first().map_or(0, |c| c.values.len()) {
-        let cells: Vec<String> = columns.iter().map(|c| c.values[i].to_string()).collect();
-        text.push_str(&(cells.join(",") + "\n"));
-    }
-    text
 }

@@ -182,13 +182,14 @@ enum Verb {
         #[command(flatten)]
         libraries: plugins::Libraries,
     },
-    /// Write a CSV table: of a run directory the draws (chain, draw, unknowns, log density), of a study its measurements
+    /// Write a table, as CSV or Parquet: of a run directory the draws (chain, draw, unknowns, log density), of a study its
+    /// measurements
     Convert {
         /// Run directory, or study file
         source: PathBuf,
         #[command(flatten)]
         settings: study::Settings,
-        /// Table to write, or `-` for the terminal
+        /// Table to write, `.csv` or `.parquet`, or `-` for CSV on the terminal
         out: PathBuf,
     },
     /// Serve a study's model, emulator and posterior over UM-Bridge, until Ctrl-C
