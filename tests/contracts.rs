@@ -352,7 +352,7 @@ fn readers() {
             ],
         ),
         ("netcdf", &[""]),
-        ("sierra", &["variable = \"strain_{sensor}\""]),
+        ("sierra", &["variable = \"strain_{sensor}\"", ""]),
     ];
     let folder = tempfile::tempdir().unwrap();
     all::<dyn Reader>(table, |case, reader| {

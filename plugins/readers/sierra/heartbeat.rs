@@ -79,15 +79,25 @@ impl Heartbeat {
     }
 }
 
-/// Returns true if the beginning of a file shows heartbeat output: Sierra's own first line, labels, or a padded
-/// legend that begins with the time.
+/// Returns true if a line begins with a time stamp in brackets, as the library's own.
+fn stamped(line: &str) -> bool {
+    line.strip_prefix('+').is_some_and(|stamp| stamp.starts_with(['[', '{', '(', '<']))
+}
+
+/// Returns true if the beginning of a file shows heartbeat output: Sierra's own first line, labels, a padded legend
+/// that begins with the time, or one of other names above numbers in the same columns.
 pub fn recognised(head: &[u8]) -> bool {
     let text = String::from_utf8_lossy(head);
-    let Some(line) = text.lines().find(|line| !line.trim().is_empty()) else { return false };
+    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
+    let Some(line) = lines.next() else { return false };
     let first = line.split([',', '\t', ';', '|']).next().unwrap_or_default();
     let labelled = first
         .split_once('=')
         .is_some_and(|(name, value)| !name.trim().is_empty() && line::number(value).is_some());
     let padded = first.len() > first.trim().len() && first.trim().eq_ignore_ascii_case("time");
-    line.starts_with("% Sierra") || labelled || padded || line.starts_with("+[")
+    line.starts_with("% Sierra")
+        || labelled
+        || padded
+        || stamped(line)
+        || lines.next().is_some_and(|row| line::legend_above(line, row))
 }

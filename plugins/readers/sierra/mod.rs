@@ -6,6 +6,7 @@ pub mod container;
 pub mod exodus;
 pub mod heartbeat;
 mod inspect;
+mod legend;
 pub mod locate;
 pub mod parts;
 pub mod probe;
@@ -62,7 +63,9 @@ pub struct Sierra {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
     /// Variable of every sensor that has no entry of its own under `sensors`. The name of an axis in braces is
-    /// replaced by the label on it: `strain_{sensor}`.
+    /// replaced by the label on it: `strain_{sensor}`. Default, if there are no `sensors` either: the column of a heartbeat file, or
+    /// the global variable of a history file, that is named like response and sensor, `strain_B` or `B_strain`, or like the sensor
+    /// alone, in upper or lower case; without sensors, like the response.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variable: Option<String>,
     /// Locations of single sensors in the output, by label.
@@ -138,6 +141,7 @@ impl Sierra {
                 .expected(super::listed(&names));
         }
         if self.variable.is_none()
+            && !self.sensors.is_empty()
             && let Some(name) = names.iter().find(|name| !self.sensors.contains_key(**name))
         {
             complaints
@@ -155,13 +159,20 @@ impl Sierra {
         }
     }
 
-    fn probe(&self, curve: &Curve) -> Result<Probe, String> {
+    fn probe(&self, curve: &Curve, response: &str, output: &Output) -> Result<Probe, ReadError> {
         if let Some(probe) = self.sensors.get(&curve.name) {
             return Ok(probe.clone());
         }
-        let pattern = self.variable.as_ref().ok_or_else(|| {
-            format!("neither `variable` nor `sensors` states where `{}` is read", curve.name)
-        })?;
+        let Some(pattern) = &self.variable else {
+            if !self.sensors.is_empty() {
+                let name = &curve.name;
+                let text =
+                    format!("neither `variable` nor `sensors` states where `{name}` is read");
+                return Err(ReadError::new(output.path(), text));
+            }
+            let labels: Vec<&str> = curve.labels.iter().map(|(_, label)| label.as_str()).collect();
+            return Ok(Probe::named(legend::column(output, response, &labels)?));
+        };
         let name = curve.labels.iter().fold(pattern.clone(), |name, (axis, label)| {
             name.replace(&format!("{{{axis}}}"), label)
         });
@@ -226,7 +237,7 @@ impl Reader for Sierra {
         let output = Output::open(path)?;
         let mut response = vec![0.0; layout.len()];
         for curve in &curves.list {
-            let probe = self.probe(curve).map_err(complain)?;
+            let probe = self.probe(curve, &layout.name, &output)?;
             let mut signal = output.signal(&probe)?;
             signal.times.iter_mut().for_each(|t| *t *= time_scale);
             let values = signal.resampled(curves.times, self.tolerance.get()).map_err(|text| {

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use lacuna::plugin::reader::ReadError;
 
+use super::exodus::Kind;
 use super::heartbeat::Heartbeat;
 use super::parts::Results;
 use super::probe::Probe;
@@ -90,6 +91,19 @@ impl Output {
 
     fn complain(&self, text: impl Into<String>) -> ReadError {
         ReadError::new(self.path(), text)
+    }
+
+    /// Names of the signals that need no place: columns of a heartbeat file, global variables of a history file.
+    pub fn column_names(&self) -> &[String] {
+        match self {
+            Self::Exodus(results) => results.parts()[0].names(Kind::Global),
+            Self::Heartbeat(table) => &table.names,
+        }
+    }
+
+    /// Returns true for heartbeat text.
+    pub fn is_heartbeat(&self) -> bool {
+        matches!(self, Self::Heartbeat(_))
     }
 
     /// Returns the path of the file, or of the first of several parts.

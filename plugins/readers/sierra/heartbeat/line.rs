@@ -27,9 +27,8 @@ pub(super) enum Line {
 /// Infers the separator from the text before the last field of a line, where there can be no time stamp. `None` for a
 /// line with a single field.
 pub(super) fn sniff(line: &str) -> Option<Separator> {
-    let inside = |c: char| {
-        c.is_alphanumeric() || matches!(c, '_' | '.' | '+' | '-' | '(' | ')' | '[' | ']' | '=')
-    };
+    // Names have signs such as `p/rho` and `%`.
+    let inside = |c: char| c.is_alphanumeric() || "_.+-()[]=%/#*^@$'".contains(c);
     let without_last = line.trim_end().trim_end_matches(inside);
     let gap_start = without_last.trim_end_matches(|c| !inside(c)).len();
     let gap = &without_last[gap_start..];
@@ -69,6 +68,23 @@ pub(super) fn parse(line: &str, separator: Option<&Separator>, columns: Option<u
         plain(fields.to_vec())
     };
     if parsed == Line::Broken && line.starts_with('-') { Line::Message } else { parsed }
+}
+
+/// Returns true for a legend above a row in the library's print: names right-aligned in fields as wide as those of the
+/// numbers, which have exponents.
+pub(super) fn legend_above(line: &str, row: &str) -> bool {
+    let Some(Separator::Text(separator)) = sniff(line) else { return false };
+    let names: Vec<&str> = line.split(separator.as_str()).collect();
+    let numbers: Vec<&str> = row.split(separator.as_str()).collect();
+    let printed = |text: &str| number(text).is_some() && text.contains('e');
+    let aligned = |(name, number): (&&str, &&str)| {
+        is_name(name.trim()) && name.trim_end() == *name && name.len() >= number.len()
+    };
+    line.starts_with(char::is_whitespace)
+        && names.len() == numbers.len()
+        && names[0].len() == numbers[0].len()
+        && printed(numbers[0])
+        && names.iter().zip(&numbers).all(aligned)
 }
 
 /// Parses a number as printed by C, C++ or Fortran, including infinities and not-a-number.
@@ -131,7 +147,10 @@ fn plain(fields: Vec<&str>) -> Line {
         Line::Broken
     } else if numbers.len() == fields.len() {
         Line::Numbers(numbers)
-    } else if numbers.is_empty() && fields.iter().all(|field| is_name(field)) {
+    } else if fields[0].eq_ignore_ascii_case("time")
+        || (numbers.is_empty() && fields.iter().all(|field| is_name(field)))
+    {
+        // Below the time, names may be anything, such as the numbers of gauges.
         Line::Names(fields.into_iter().map(ToOwned::to_owned).collect())
     } else {
         Line::Broken

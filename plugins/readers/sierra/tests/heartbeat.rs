@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use super::super::heartbeat::Heartbeat;
+use super::super::heartbeat::{Heartbeat, recognised};
 use super::{base, largest_difference, reference, sample};
 
 fn parse(text: &str) -> Heartbeat {
@@ -117,6 +117,84 @@ fn a_last_line_without_end_counts_only_if_it_is_whole() {
         assert_eq!(table.notes.len(), usize::from(!cut.trim().is_empty()), "cut `{cut}`");
     }
     assert!(complaint("Time, a\n 1.0, 1.").contains("no complete row"));
+}
+
+/// The layout of `Iohb_Layout::add_legend` and `add`, which the settings of a heartbeat block choose: names and numbers right-aligned
+/// in fields of one width, between separators, after the time and a stamp if these are wanted.
+fn printed(settings: &Settings, names: &[&str], rows: &[[f64; 4]]) -> String {
+    let Settings { separator, width, time, stamp, labels } = *settings;
+    let stamp = if stamp.is_empty() { String::new() } else { format!("+{stamp} ") };
+    let skipped = usize::from(!time);
+    let legend: Vec<String> =
+        ["Time"].iter().chain(names).skip(skipped).map(|name| format!("{name:>width$}")).collect();
+    let mut text = format!("{stamp}{}\n", legend.join(separator));
+    for row in rows {
+        let field = |(name, x): (&&str, &f64)| {
+            let number = format!("{x:.5e}");
+            let (mantissa, exponent) = number.split_once('e').unwrap();
+            let number = format!("{mantissa}e{:+03}", exponent.parse::<i32>().unwrap());
+            if labels { format!("{name}={number}") } else { format!("{number:>width$}") }
+        };
+        let fields = ["TIME"].iter().chain(names).zip(row).skip(skipped);
+        text.push_str(&format!(
+            "{stamp}{}\n",
+            fields.map(field).collect::<Vec<_>>().join(separator)
+        ));
+    }
+    text
+}
+
+struct Settings {
+    separator: &'static str,
+    width: usize,
+    time: bool,
+    stamp: &'static str,
+    labels: bool,
+}
+
+#[test]
+fn a_legend_names_the_columns_under_all_settings() {
+    let rows = [[1e-5, 2e-6, -3e-6, 4e-10], [2e-5, 2.5e-6, -3.5e-6, 4.5e-10]];
+    for names in [
+        ["strain_B", "STRAIN_C", "s(1)"],
+        ["12", "2B", "-x"],
+        ["_a", "nan", "%y"],
+        ["p/rho", "50%", "a^2*b"],
+    ] {
+        for separator in [", ", "\t", " | ", ";"] {
+            for (width, stamp, labels) in [
+                (12, "", false),
+                (0, "", false),
+                (17, "[06:08:23]", false),
+                (12, "", true),
+                (12, "{Fri Apr 15, 2022}", true),
+            ] {
+                let settings = Settings { separator, width, time: true, stamp, labels };
+                let text = printed(&settings, &names, &rows);
+                let table = parse(&text);
+                assert_eq!(table.names, [&["Time"], &names[..]].concat(), "{text}");
+                assert_eq!(table.columns[3], [4e-10, 4.5e-10], "{text}");
+                assert!(width == 0 || recognised(text.as_bytes()), "{text}");
+            }
+        }
+    }
+}
+
+/// A legend without the time, as of a block with `legend = on` and no time field.
+#[test]
+fn a_legend_without_the_time_is_recognised() {
+    let names = ["timestep", "strain_B", "c"];
+    let rows = [[0.0, 2e-6, -3e-6, 4e-10], [0.0, 2.5e-6, -3.5e-6, 4.5e-10]];
+    for separator in [", ", "\t", ";"] {
+        let settings = Settings { separator, width: 12, time: false, stamp: "", labels: false };
+        let text = printed(&settings, &names, &rows);
+        assert!(recognised(text.as_bytes()), "{text}");
+        let error = parse(&text).series("strain_B").unwrap_err().to_string();
+        assert!(error.contains("no time column; it has `timestep`, `strain_B`, `c`"), "{error}");
+    }
+    for table in ["a,b\n1.0e-01,2.0e-01\n", " a, b\n 1, 2\n", "  run,  x\n r001, 2.0e+00\n"] {
+        assert!(!recognised(table.as_bytes()), "{table}");
+    }
 }
 
 #[test]

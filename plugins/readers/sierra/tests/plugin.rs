@@ -245,3 +245,40 @@ fn options_decode_from_a_study() {
         assert!(text.contains(expected), "expected `{expected}` in `{text}`");
     }
 }
+
+/// Options without `variable` and `sensors`: columns and global variables are found by their names.
+#[test]
+fn columns_named_like_the_sensors_need_no_options() {
+    let layout = layout(base().1, "1");
+    let own = Sierra::default();
+    for name in ["hb_default.txt", "hb_csv_labels.csv", "hb_spyhis.txt", "hist_cdf2.h"] {
+        let right = reader().response(&sample(name), &layout).unwrap();
+        assert_eq!(own.response(&sample(name), &layout).unwrap(), right, "{name}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.txt");
+    let mut two = layout.clone();
+    two.axes = vec![
+        Axis::labels("sensor", ["B", "12"]),
+        Axis::grid("time", vec![1.0, 2.0], Unit::dimensionless()),
+    ];
+    let read = |legend: &str| {
+        std::fs::write(&path, format!("{legend}\n 1.0, 2.0, 3.0, 4.0\n 2.0, 5.0, 6.0, 7.0\n"))
+            .unwrap();
+        own.response(&path, &two).map_err(|e| e.to_string())
+    };
+    for (legend, right) in [
+        ("    Time, b, timestep, 12", [2.0, 5.0, 4.0, 7.0]),
+        ("    TIME, 12_STRAIN, B_STRAIN, timestep", [3.0, 6.0, 2.0, 5.0]),
+        ("    time, B, strain_B, strain_12", [3.0, 6.0, 4.0, 7.0]),
+    ] {
+        assert_eq!(read(legend).unwrap(), right, "{legend}");
+    }
+    let error = read("    Time, B, C, D").unwrap_err();
+    let right =
+        "run.txt: has no column `strain_12`, `12_strain`, `12`; it has `Time`, `B`, `C`, `D`";
+    assert!(error.contains(right) && error.contains("variable = "), "{error}");
+    two.axes[0] = Axis::labels("sensor", ["12"]);
+    let error = own.response(&sample("hist_cdf2.h"), &two).unwrap_err().to_string();
+    assert!(error.contains("has no global variable `strain_12`"), "{error}");
+}
