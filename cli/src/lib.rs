@@ -183,13 +183,13 @@ enum Verb {
         libraries: plugins::Libraries,
     },
     /// Write a table, as CSV or Parquet: of a run directory the draws (chain, draw, unknowns, log density), of a study its
-    /// measurements
+    /// measurements; or the emulator of a run as numbers, as netCDF
     Convert {
         /// Run directory, or study file
         source: PathBuf,
         #[command(flatten)]
         settings: study::Settings,
-        /// Table to write, `.csv` or `.parquet`, or `-` for CSV on the terminal
+        /// Table to write, `.csv` or `.parquet`, or `-` for CSV on the terminal; `.nc` for the emulator
         out: PathBuf,
     },
     /// Serve a study's model, emulator and posterior over UM-Bridge, until Ctrl-C
