@@ -312,6 +312,7 @@ fn sound_files(name: &str, reader: &dyn Reader, folder: &Path) -> Vec<Sample> {
         "matlab" => ["records.mat", "records_plain.mat", "records_73.mat"]
             .map(|file| sample(samples().join(file), 1e-12))
             .to_vec(),
+        "tdms" => vec![sample(samples().join("records.tdms"), 1e-12)],
         "netcdf" => {
             let response = model::Response { values: values.clone(), valid: true, facts: vec![] };
             let file = write_response(folder, "sound", &layout, &response).unwrap();
@@ -353,6 +354,7 @@ fn readers() {
         ),
         ("netcdf", &[""]),
         ("sierra", &["variable = \"strain_{sensor}\"", ""]),
+        ("tdms", &["dataset = \"strain/{sensor}\""]),
     ];
     let folder = tempfile::tempdir().unwrap();
     all::<dyn Reader>(table, |case, reader| {

@@ -37,7 +37,7 @@ const NUMBERS: [&[u8]; 16] = [
 /// Samples of other programs that are larger than files of a corpus should be.
 const SAMPLES: [(&str, &[&str]); 2] = [
     ("exodus", &["hist_cdf2.h", "hist_cdf5.h", "hist_nc4.h"]),
-    ("records", &["records.h5", "records_73.mat"]),
+    ("records", &["records.h5", "records_73.mat", "records.tdms", "types.tdms"]),
 ];
 
 /// The files of a corpus in the order of their names, and samples.

@@ -14,6 +14,7 @@ pub mod runs;
 pub mod scenario;
 pub mod sheet;
 pub mod sierra;
+pub mod tdms;
 
 /// Formats names for a message: all of a short list, the beginning of a long one.
 pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {

@@ -175,6 +175,7 @@ fn reader(name: &str, reader: &dyn Reader, bits: &mut Bits) {
     let file = match name {
         "csv" => "base.csv",
         "netcdf" => "hist_nc4.h",
+        "tdms" => "records.tdms",
         _ => "hist_cdf5.h",
     };
     // The contents of a file; the numbers read for a study are covered by the read stage.

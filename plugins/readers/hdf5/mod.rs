@@ -62,5 +62,5 @@ fn recognises(path: &Path, head: &[u8]) -> bool {
         && file::File::open(path).is_ok_and(|file| !file.is_netcdf())
 }
 
-reads_records!(Hdf5, open, recognises);
+reads_records!(Hdf5, open, recognises, false);
 lacuna::register!(Reader, "hdf5", Hdf5, aliases: ["h5", "h5py"]);

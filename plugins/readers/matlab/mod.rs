@@ -71,5 +71,5 @@ fn recognises(_: &Path, head: &[u8]) -> bool {
     head.starts_with(VERSION_73) || level5::recognised(head)
 }
 
-reads_records!(Matlab, open, recognises);
+reads_records!(Matlab, open, recognises, false);
 lacuna::register!(Reader, "matlab", Matlab, aliases: ["mat", "octave"]);

@@ -10,8 +10,13 @@ use super::{REPLICATES, Records, in_path, replicate_files};
 use crate::readers::{listed, scenario};
 
 impl Records {
-    /// Checks the options.
-    pub fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+    /// Checks the options. `states_times`: the files may state the times of samples themselves.
+    pub fn check(
+        &self,
+        states_times: bool,
+        context: &Context<'_>,
+        complaints: &mut Complaints<'_>,
+    ) {
         let layout = context.layout;
         let is_grid = |c: &Coordinates| matches!(c, Coordinates::Grid { .. });
         let grids = layout.axes.iter().filter(|axis| is_grid(&axis.coordinates)).count();
@@ -21,7 +26,7 @@ impl Records {
                 layout.name
             ));
         }
-        self.check_times(grids, complaints);
+        self.check_times(grids > 0 && !states_times, complaints);
         self.check_units(layout, complaints);
         self.check_names(layout, complaints);
         if self.trigger.is_some() && self.resample == Resample::Exact {
@@ -50,10 +55,10 @@ impl Records {
         }
     }
 
-    fn check_times(&self, grids: usize, complaints: &mut Complaints<'_>) {
+    fn check_times(&self, needed: bool, complaints: &mut Complaints<'_>) {
         if self.time.is_some() && self.step.is_some() {
             complaints.at("step").say("`time` and `step` exclude each other");
-        } else if grids > 0 && self.time.is_none() && self.step.is_none() {
+        } else if needed && self.time.is_none() && self.step.is_none() {
             complaints.at("").say("the options do not state the times of the samples").help(
                 "name their dataset with `time`, or give `step`, the interval between samples",
             );

@@ -1,4 +1,4 @@
-//! Measured records in files of named arrays: the options and the reading that `hdf5` and `matlab` share.
+//! Measured records in files of named arrays: the options and the reading that `hdf5`, `matlab` and `tdms` share.
 
 mod check;
 mod cut;
@@ -29,16 +29,17 @@ use lacuna::text::values::AllowFailed;
 /// Name by which `axes` calls the dimension of the replicates.
 const REPLICATES: &str = "replicate";
 
-/// Implements a reader that is a newtype of [`Records`], from the functions that open and recognise its files.
+/// Implements a reader that is a newtype of [`Records`], from the functions that open and recognise its files, and whether
+/// the files may state the times of samples.
 macro_rules! reads_records {
-    ($reader:ty, $open:path, $recognises:path) => {
+    ($reader:ty, $open:path, $recognises:path, $states_times:literal) => {
         impl lacuna::plugin::Component for $reader {
             fn check(
                 &self,
                 context: &lacuna::plugin::Context<'_>,
                 complaints: &mut lacuna::text::problem::Complaints<'_>,
             ) {
-                self.0.check(context, complaints);
+                self.0.check($states_times, context, complaints);
             }
 
             fn environment(
@@ -128,13 +129,14 @@ pub struct Records {
     /// Time of the first sample, in `time_unit`, for records at a constant rate. Default: 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first: Option<f64>,
-    /// Interval between samples, in `time_unit`, in place of `time`.
+    /// Interval between samples, in `time_unit`, in place of `time`. Default: that of a TDMS file (`wf_increment`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<f64>,
-    /// Unit of the values, in place of the attribute `units` or `unit` of the dataset. Default: the unit of the response.
+    /// Unit of the values, in place of that of the file: the attribute `units` or `unit` of a dataset in HDF5, the property
+    /// `unit_string` of a channel in TDMS. Default: the unit of the response.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
-    /// Unit of the times, in place of their attribute. Default: the unit of the response's axis.
+    /// Unit of the times, in place of that of the file. Default: the unit of the response's axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_unit: Option<Unit>,
     /// How samples come to the times of the response.

@@ -7,7 +7,7 @@ use lacuna::plugin::reader::ReadError;
 
 use super::Records;
 use super::place::{Placed, Resample, place};
-use super::store::{Array, REPLICATE, Store, array, by_number, captured};
+use super::store::{Array, REPLICATE, Rate, Store, array, by_number, captured};
 use crate::readers::listed;
 
 /// The replicates of a file.
@@ -53,10 +53,6 @@ impl<'a> Reading<'a> {
                 }
                 Coordinates::Labels(_) => inside.push(i),
             }
-        }
-        if grid.is_some() && options.time.is_none() && options.step.is_none() {
-            let text = "the options state neither `time` nor `step`";
-            return Err(ReadError::new(store.path(), text));
         }
         Ok(Self { options, store, layout, grid, inside, named, pattern })
     }
@@ -185,10 +181,9 @@ impl<'a> Reading<'a> {
     ) -> Result<Vec<Vec<f64>>, ReadError> {
         let own = self.options.time_unit.as_ref();
         let Some(time) = time else {
-            let (first, step) =
-                (self.options.first.unwrap_or(0.0), self.options.step.unwrap_or(0.0));
+            let Rate { first, step, unit: stated } = self.rate(dataset)?;
             let values = (0..length).map(|n| first + n as f64 * step).collect();
-            let array = Array { shape: vec![length], values, unit: None };
+            let array = Array { shape: vec![length], values, unit: stated };
             return Ok(vec![converted(self.store.path(), dataset, array, own, unit)?]);
         };
         let array = array(self.store, time)?;
@@ -205,6 +200,18 @@ impl<'a> Reading<'a> {
             "expected {length} times, as many as samples of `{dataset}`, found the shape {whole:?}"
         );
         Err(self.at(time, text))
+    }
+
+    /// First time and interval of a dataset: those of the options, else those of the file.
+    fn rate(&self, dataset: &str) -> Result<Rate, ReadError> {
+        if let Some(step) = self.options.step {
+            let first = self.options.first.unwrap_or(0.0);
+            return Ok(Rate { first, step, unit: None });
+        }
+        self.store.rate(dataset).ok_or_else(|| {
+            let text = "has no times in the file, and the options state neither `time` nor `step`";
+            self.at(dataset, text)
+        })
     }
 
     /// Times relative to the trigger.

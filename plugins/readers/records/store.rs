@@ -54,6 +54,17 @@ impl Array {
     }
 }
 
+/// Times at which a file says that the samples of a dataset were taken, without an array of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rate {
+    /// Time of the first sample.
+    pub first: f64,
+    /// Interval between samples, above zero.
+    pub step: f64,
+    /// Unit of both, as the file writes it; `None` if it states none.
+    pub unit: Option<String>,
+}
+
 /// An open file with named arrays.
 pub trait Store {
     /// Path of the file.
@@ -67,6 +78,16 @@ pub trait Store {
 
     /// Reads a dataset of [`Store::names`]; fails if it does not hold numbers.
     fn array(&self, name: &str) -> Result<Array, ReadError>;
+
+    /// The times that the file states for the samples of a dataset; `None` if it states none.
+    fn rate(&self, _name: &str) -> Option<Rate> {
+        None
+    }
+
+    /// Further facts about the file, for its description.
+    fn facts(&self) -> Vec<(String, String)> {
+        Vec::new()
+    }
 }
 
 /// Reads a dataset; the error about an unknown name lists those of the file.
@@ -80,7 +101,8 @@ pub fn array(store: &dyn Store, name: &str) -> Result<Array, ReadError> {
 
 /// Describes all datasets of a file.
 pub fn contents(store: &dyn Store) -> Contents {
-    let mut contents = Contents { format: store.format(), ..Contents::default() };
+    let mut contents =
+        Contents { format: store.format(), facts: store.facts(), ..Contents::default() };
     for name in store.names() {
         match store.array(name) {
             Ok(array) => contents.variables.push(described(name, array)),

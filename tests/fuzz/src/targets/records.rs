@@ -1,4 +1,4 @@
-//! Measured records: netCDF, HDF5 and MAT-files.
+//! Measured records: netCDF, HDF5, MAT and TDMS files.
 
 use lacuna::plugin::Reader;
 use lacuna::plugin::reader::{GridSource, MeasurementSource};
@@ -8,7 +8,7 @@ use lacuna_plugins as _;
 use super::shared::{LONGEST, as_file, is_told, layout, unit};
 
 /// The readers of files of named arrays, with options of each.
-const READERS: [(&str, &str); 5] = [
+const READERS: [(&str, &str); 7] = [
     ("netcdf", "path = \"shots.dat\""),
     ("hdf5", "path = \"shots.dat\"\ndataset = \"displacement\"\naxes = [\"time\"]\nstep = 0.05"),
     (
@@ -23,6 +23,8 @@ const READERS: [(&str, &str); 5] = [
         "matlab",
         "path = \"shots.dat\"\ndataset = \"pulse({replicate}).strain\"\naxes = [\"time\"]\ntime = \"pulse({replicate}).t\"",
     ),
+    ("tdms", "path = \"shots.dat\"\ndataset = \"strain/{replicate}\"\nresample = \"linear\""),
+    ("tdms", "path = \"shots.dat\"\ndataset = \"types/float64\"\nstep = 0.05\ntime_unit = \"s\""),
 ];
 
 /// Checks that a record that is read has the shape of the response, and that a damaged one is told with the file.
