@@ -21,7 +21,7 @@ pub enum What {
         /// Folder to create
         name: PathBuf,
     },
-    /// A plugin that works as it is: one file in Lacuna's source, or a library of its own
+    /// A plugin that works as it is: one file in Lacuna's source, a library of its own, or a file in another language
     Plugin {
         /// Kind, such as `sampler`
         kind: String,

@@ -5,7 +5,7 @@ use std::path::Path;
 use lacuna::run::files;
 
 use super::plugin::{refuse_known, section, wrong};
-use super::skeleton::{Skeleton, type_name};
+use super::skeleton::{Skeleton, misnamed, type_name};
 use crate::print;
 
 /// Language of a skeleton.
@@ -17,36 +17,67 @@ pub enum Language {
     Python,
     /// A library in one file of C99, with the header.
     C,
+    /// A library in one file of C++17, with the header.
+    #[value(name = "c++", alias = "cpp")]
+    Cpp,
 }
 
-/// Skeletons in Python, by kind.
-pub const IN_PYTHON: [(&str, &str); 7] = [
-    ("discrepancy", include_str!("python/discrepancy.py")),
-    ("effect", include_str!("python/effect.py")),
-    ("model", include_str!("python/model.py")),
-    ("quantity", include_str!("python/quantity.py")),
-    ("reader", include_str!("python/reader.py")),
-    ("sampler", include_str!("python/sampler.py")),
-    ("surrogate", include_str!("python/surrogate.py")),
-];
+macro_rules! skeletons {
+    ($folder:literal $extension:literal: $($kind:literal)+) => {
+        &[$(($kind, include_str!(concat!($folder, "/", $kind, ".", $extension)))),+]
+    };
+}
 
-/// Examples in C by kind, each with its name.
-const IN_C: [(&str, &str, &str); 2] = [
-    ("discrepancy", "plain_gaussian", include_str!("../../../examples/plugin_c/plain_gaussian.c")),
-    ("model", "rod", include_str!("../../../examples/plugin_c/rod.c")),
-];
+/// Skeletons of a language, by kind.
+pub type Skeletons = &'static [(&'static str, &'static str)];
+
+/// Skeletons in Python.
+pub const IN_PYTHON: Skeletons = skeletons!("python" "py":
+    "discrepancy" "effect" "model" "quantity" "reader" "sampler" "surrogate");
+
+/// Skeletons in C.
+pub const IN_C: Skeletons = skeletons!("c" "c":
+    "design" "discrepancy" "effect" "model" "quantity" "reader" "sampler" "surrogate");
+
+/// Skeletons in C++.
+pub const IN_CPP: Skeletons = skeletons!("cpp" "cpp":
+    "design" "discrepancy" "effect" "model" "quantity" "reader" "sampler" "surrogate");
+
 const HEADER: &str = include_str!("../../../sdk/include/lacuna_plugin.h");
 
 /// Writes a plugin into a file of the current folder.
 pub fn write(kind: &str, name: &str, language: Language) -> anyhow::Result<()> {
-    if let Some((text, help)) = Skeleton::of(kind).and_then(|skeleton| skeleton.fault(name)) {
+    let fault = match language {
+        // The code has the name in texts alone, so that it may be any word.
+        Language::C | Language::Cpp => misnamed(name),
+        Language::Python | Language::Rust => {
+            Skeleton::of(kind).and_then(|skeleton| skeleton.fault(name))
+        }
+    };
+    if let Some((text, help)) = fault {
         return Err(wrong(&text, help));
     }
     refuse_known(kind, name)?;
     match language {
-        Language::C => in_c(kind, name),
+        Language::C => {
+            let file = format!("{name}.c");
+            in_library(kind, name, &file, found(IN_C, kind, "C")?, "cc -std=c99", " -lm")
+        }
+        Language::Cpp => {
+            let file = format!("{name}.cpp");
+            in_library(kind, name, &file, found(IN_CPP, kind, "C++")?, "c++ -std=c++17", "")
+        }
         Language::Python | Language::Rust => in_python(kind, name),
     }
+}
+
+/// The skeleton of a kind.
+fn found(all: Skeletons, kind: &str, language: &str) -> anyhow::Result<&'static str> {
+    all.iter().find(|(known, _)| *known == kind).map(|(_, text)| *text).ok_or_else(|| {
+        let kinds: Vec<String> = all.iter().map(|(kind, _)| format!("`{kind}`")).collect();
+        let text = format!("there is no skeleton of the kind `{kind}` in {language}");
+        wrong(&text, &format!("the kinds are {}", kinds.join(", ")))
+    })
 }
 
 /// A plugin in Python under another name.
@@ -55,10 +86,7 @@ pub fn python(text: &str, name: &str) -> String {
 }
 
 fn in_python(kind: &str, name: &str) -> anyhow::Result<()> {
-    let kinds = IN_PYTHON.iter().map(|(kind, _)| *kind);
-    let Some((_, text)) = IN_PYTHON.iter().find(|(known, _)| *known == kind) else {
-        return Err(missing(kind, "Python", kinds));
-    };
+    let text = found(IN_PYTHON, kind, "Python")?;
     let file = format!("{name}.py");
     create(Path::new(&file), &python(text, name))?;
     let section = section(kind);
@@ -74,35 +102,35 @@ It works as it stands. Next:
     Ok(())
 }
 
-fn in_c(kind: &str, name: &str) -> anyhow::Result<()> {
-    let kinds = IN_C.iter().map(|(kind, ..)| *kind);
-    let Some((_, example, text)) = IN_C.iter().find(|(known, ..)| *known == kind) else {
-        return Err(missing(kind, "C", kinds));
-    };
-    let (file, library) = (format!("{name}.c"), format!("lib{name}.so"));
-    create(Path::new(&file), &text.replace(&format!("\"{example}\""), &format!("\"{name}\"")))?;
-    let header = Path::new("lacuna_plugin.h");
-    if !header.exists() {
+/// A plugin that a compiler makes a library of.
+fn in_library(
+    kind: &str,
+    name: &str,
+    file: &str,
+    text: &str,
+    compiler: &str,
+    libraries: &str,
+) -> anyhow::Result<()> {
+    create(Path::new(file), &text.replace("skeleton", name))?;
+    let (header, library) = (Path::new("lacuna_plugin.h"), format!("lib{name}.so"));
+    let beside = if header.exists() {
+        ""
+    } else {
         create(header, HEADER)?;
-    }
+        " and lacuna_plugin.h"
+    };
     let section = section(kind);
     print(&format!(
-        "wrote {file} and lacuna_plugin.h
+        "wrote {file}{beside}
 
-It works as it stands: the example `{example}`. Next:
-  1. replace its behaviour with your own
-  2. cc -std=c99 -O2 -fPIC -shared {file} -o {library} -lm
+It works as it stands. Next:
+  1. replace its behaviour with your own; the descriptions in its schema are its manual
+  2. {compiler} -O2 -fPIC -shared {file} -o {library}{libraries}
   3. lacuna plugins test {library}
   4. load it in a study: `load = [\"./{library}\"]` in `[plugins]`
   5. use it: `use = \"{name}\"` in `[{section}]`"
     ));
     Ok(())
-}
-
-fn missing<'a>(kind: &str, language: &str, kinds: impl Iterator<Item = &'a str>) -> anyhow::Error {
-    let kinds: Vec<String> = kinds.map(|kind| format!("`{kind}`")).collect();
-    let text = format!("there is no skeleton of the kind `{kind}` in {language}");
-    wrong(&text, &format!("the kinds are {}", kinds.join(", ")))
 }
 
 fn create(file: &Path, text: &str) -> anyhow::Result<()> {

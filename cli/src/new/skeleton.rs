@@ -73,14 +73,8 @@ impl Skeleton {
 
     /// The fault of a plugin name for this skeleton, and a description of valid names; `None` if the name is valid.
     pub fn fault(&self, name: &str) -> Option<(String, &'static str)> {
-        let words = || name.split('_');
-        let sound = |word: &str| {
-            !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit())
-        };
-        if !words().all(sound) || name.starts_with(|c: char| c.is_ascii_digit()) {
-            let help =
-                "names are small letters, digits and single underscores, such as `random_walk`";
-            return Some((format!("`{name}` is no name of a plugin"), help));
+        if let Some(fault) = misnamed(name) {
+            return Some(fault);
         }
         if KEYWORDS.split_whitespace().any(|word| word == name) {
             let text = format!("`{name}` is a keyword of Rust and cannot name a module");
@@ -103,6 +97,18 @@ impl Skeleton {
         word != NAMES[0]
             && code.flat_map(|line| line.split(|c| !is_word(c))).any(|other| other == word)
     }
+}
+
+/// The fault of a name that no plugin has, whatever its language, and a description of valid names.
+pub fn misnamed(name: &str) -> Option<(String, &'static str)> {
+    let sound = |word: &str| {
+        !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit())
+    };
+    if name.split('_').all(sound) && !name.starts_with(|c: char| c.is_ascii_digit()) {
+        return None;
+    }
+    let help = "names are small letters, digits and single underscores, such as `random_walk`";
+    Some((format!("`{name}` is no name of a plugin"), help))
 }
 
 /// Name of the options type: `random_walk` gives `RandomWalk`.

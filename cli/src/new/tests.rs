@@ -6,6 +6,7 @@ use std::path::Path;
 
 use lacuna::plugin::registry;
 
+use super::language::{IN_C, IN_CPP};
 use super::skeleton::{ALL, Skeleton, kinds, type_name};
 use super::{library, tree};
 
@@ -87,5 +88,32 @@ fn a_library_has_the_plugin_the_sdk_and_the_crates_of_the_workspace() {
     for (name, written) in library::CRATES {
         let line = workspace.lines().find(|line| line.starts_with(&format!("{name} = "))).unwrap();
         assert_eq!(version(line), version(written), "{name}");
+    }
+}
+
+/// A name stands in the texts of a skeleton alone, so that it may be a word of the language; all files in C++ begin with the
+/// same functions.
+#[test]
+fn a_skeleton_that_is_compiled_has_its_name_in_texts_alone() {
+    let in_libraries: Vec<&str> =
+        ALL.iter().filter(|skeleton| skeleton.in_libraries).map(|skeleton| skeleton.kind).collect();
+    for skeletons in [IN_C, IN_CPP] {
+        let kinds: Vec<&str> = skeletons.iter().map(|(kind, _)| *kind).collect();
+        assert_eq!(kinds, in_libraries);
+        for (kind, text) in skeletons {
+            assert!(text.starts_with("/* `skeleton`: "), "{kind}");
+            for line in text.lines().skip(1).filter(|line| line.contains("skeleton")) {
+                let words = line.matches("\"skeleton\"").count();
+                assert_eq!(line.matches("skeleton").count(), words, "{kind}: {line}");
+            }
+        }
+    }
+    let beginning = |text: &'static str| {
+        let begin = text.find("struct Rejected").unwrap();
+        &text[begin..text.find("\nRejected wrong_option").unwrap()]
+    };
+    let first = beginning(IN_CPP[0].1);
+    for (kind, text) in IN_CPP {
+        assert_eq!(beginning(text), first, "{kind}");
     }
 }

@@ -1,0 +1,176 @@
+/* `skeleton`: a Kronecker sequence, every point a fixed step from the previous one, modulo the unit cube.
+ *
+ * The steps are the powers 1/g, 1/g^2, ... of the root above one of g^(d + 1) = g + 1: the golden ratio for d = 1.
+ *
+ * Reference: Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
+ */
+#include "lacuna_plugin.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace {
+
+/* What the program may try again with something else. */
+struct Rejected : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+/* Appends to the text of an answer. */
+int32_t say(const LacunaAnswer *answer, std::string_view text, int32_t status = LACUNA_OK)
+{
+    lacuna_say(answer, text.data(), text.size());
+    return status;
+}
+
+/* Runs a function behind the boundary. Nothing may unwind into the program: an exception becomes the text of a status. */
+template <class Act>
+int32_t guard(const LacunaAnswer *answer, Act act) noexcept
+{
+    try {
+        act();
+        return LACUNA_OK;
+    } catch (const Rejected &reason) {
+        return say(answer, reason.what(), LACUNA_REJECTED);
+    } catch (const std::exception &error) {
+        return say(answer, error.what(), LACUNA_STOP);
+    } catch (...) {
+        return say(answer, "an exception of an unknown type", LACUNA_STOP);
+    }
+}
+
+std::string string_of(LacunaText text)
+{
+    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
+}
+
+/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
+size_t after(const std::string &json, const std::string &piece, size_t from = 0)
+{
+    const size_t at = from == std::string::npos ? from : json.find(piece, from);
+    return at == std::string::npos ? at : at + piece.size();
+}
+
+Rejected wrong_option(const std::string &key, const std::string &expected)
+{
+    return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
+                    "\"}]");
+}
+
+/* ---- the options ---- */
+
+struct Plugin {
+    bool random_start = true;
+
+    explicit Plugin(const std::string &options)
+    {
+        const size_t at = after(options, R"("random_start":)");
+        if (at != std::string::npos) {
+            random_start = options.compare(at, 4, "true") == 0;
+            if (!random_start && options.compare(at, 5, "false") != 0) {
+                throw wrong_option("random_start", "true or false");
+            }
+        }
+    }
+};
+
+int32_t schema(const LacunaAnswer *answer)
+{
+    return say(answer, R"({
+    "type": "object",
+    "description": "Kronecker sequence of the generalised golden ratio, for few parameters: a longer design )"
+    R"(begins with the shorter one.",
+    "additionalProperties": false,
+    "properties": {
+        "random_start": {
+            "type": "boolean", "default": true,
+            "description": "`true` starts the sequence at a random point of the cube instead of its centre."
+        }
+    }
+})");
+}
+
+int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+}
+
+void destroy(void *plugin)
+{
+    delete static_cast<Plugin *>(plugin);
+}
+
+/* All options with their defaults, which the record of a run keeps. */
+int32_t options(void *plugin, const LacunaAnswer *answer)
+{
+    const bool random_start = static_cast<const Plugin *>(plugin)->random_start;
+    return say(answer, random_start ? R"({"random_start":true})" : R"({"random_start":false})");
+}
+
+/* ---- the points ---- */
+
+/* The points behind the first `known` ones of the sequence. All that is drawn follows from the key alone. */
+void place(const Plugin &plugin, size_t known, size_t count, size_t dimension, LacunaKey key, double *points)
+{
+    std::mt19937_64 random(key.words[0]);
+    std::uniform_real_distribution<double> uniform;
+    double g = 2.0;
+    /* Each pass reduces the error at least by a factor of three. */
+    for (int pass = 0; pass < 60; ++pass) {
+        g = std::pow(1.0 + g, 1.0 / (static_cast<double>(dimension) + 1.0));
+    }
+    for (size_t j = 0; j < dimension; ++j) {
+        const double start = plugin.random_start ? uniform(random) : 0.5;
+        const double step = std::pow(g, -static_cast<double>(j + 1));
+        for (size_t i = 0; i < count; ++i) {
+            const double x = start + static_cast<double>(known + i + 1) * step;
+            /* The unit cube is open: zero is excluded. */
+            points[i * dimension + j] = std::max(x - std::floor(x), std::numeric_limits<double>::epsilon());
+        }
+    }
+}
+
+int32_t points(void *plugin, size_t count, size_t dimension, LacunaKey key, double *out, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] { place(*static_cast<const Plugin *>(plugin), 0, count, dimension, key, out); });
+}
+
+/* The sequence goes on behind its known points: the key is the one that placed them. */
+int32_t extend(void *plugin, LacunaText, LacunaNumbers known, size_t count, LacunaKey key, double *out,
+               const LacunaAnswer *answer)
+{
+    return guard(answer,
+                 [&] { place(*static_cast<const Plugin *>(plugin), known.rows, count, known.columns, key, out); });
+}
+
+/* ---- the library ---- */
+
+constexpr LacunaComponentFunctions component = [] {
+    LacunaComponentFunctions table{};
+    table.size = sizeof table;
+    table.schema = schema;
+    table.create = create;
+    table.destroy = destroy;
+    table.options = options;
+    return table;
+}();
+
+constexpr LacunaDesignFunctions design = [] {
+    LacunaDesignFunctions table{};
+    table.size = sizeof table;
+    table.points = points;
+    table.extend = extend;
+    return table;
+}();
+
+const LacunaEntry entries[] = {LACUNA_ENTRY("design", "skeleton", component, design)};
+
+} // namespace
+
+LACUNA_DECLARE("skeleton", "1.0.0", LACUNA_PROVIDES("design", "skeleton"), entries);

@@ -1,0 +1,235 @@
+/* `skeleton`: exponential decay, `amplitude exp(-rate t) + background` at any times.
+ *
+ * The charge of a capacitor, the activity of one isotope, a first-order reaction. The response has one axis, a grid of
+ * times in seconds; amplitude and rate are the inputs.
+ */
+#include "lacuna_plugin.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+/* What the program may try again with something else. */
+struct Rejected : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+/* Appends to the text of an answer. */
+int32_t say(const LacunaAnswer *answer, std::string_view text, int32_t status = LACUNA_OK)
+{
+    lacuna_say(answer, text.data(), text.size());
+    return status;
+}
+
+/* Runs a function behind the boundary. Nothing may unwind into the program: an exception becomes the text of a status. */
+template <class Act>
+int32_t guard(const LacunaAnswer *answer, Act act) noexcept
+{
+    try {
+        act();
+        return LACUNA_OK;
+    } catch (const Rejected &reason) {
+        return say(answer, reason.what(), LACUNA_REJECTED);
+    } catch (const std::exception &error) {
+        return say(answer, error.what(), LACUNA_STOP);
+    } catch (...) {
+        return say(answer, "an exception of an unknown type", LACUNA_STOP);
+    }
+}
+
+std::string string_of(LacunaText text)
+{
+    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
+}
+
+/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
+size_t after(const std::string &json, const std::string &piece, size_t from = 0)
+{
+    const size_t at = from == std::string::npos ? from : json.find(piece, from);
+    return at == std::string::npos ? at : at + piece.size();
+}
+
+Rejected wrong_option(const std::string &key, const std::string &expected)
+{
+    return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
+                    "\"}]");
+}
+
+/* A number with all its digits. */
+std::string digits(double x)
+{
+    char text[32];
+    std::snprintf(text, sizeof text, "%.17g", x);
+    return text;
+}
+
+/* ---- the options ---- */
+
+struct Plugin {
+    double background = 0.0;
+
+    explicit Plugin(const std::string &options)
+    {
+        const size_t at = after(options, R"("background":)");
+        if (at != std::string::npos) {
+            char *end = nullptr;
+            background = std::strtod(options.c_str() + at, &end);
+            if (end == options.c_str() + at || !std::isfinite(background)) {
+                throw wrong_option("background", "a finite number");
+            }
+        }
+    }
+};
+
+int32_t schema(const LacunaAnswer *answer)
+{
+    return say(answer, R"({
+    "type": "object",
+    "description": "Exponential decay: `amplitude exp(-rate t) + background` at any times.",
+    "additionalProperties": false,
+    "properties": {
+        "background": {
+            "type": "number", "default": 0.0,
+            "description": "Value after complete decay, in the unit of the response."
+        }
+    }
+})");
+}
+
+int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+}
+
+void destroy(void *plugin)
+{
+    delete static_cast<Plugin *>(plugin);
+}
+
+/* All options with their defaults, which the record of a run keeps. */
+int32_t options(void *plugin, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        say(answer, R"({"background":)" + digits(static_cast<const Plugin *>(plugin)->background) + "}");
+    });
+}
+
+/* ---- the model ---- */
+
+/* The inputs, with the amplitude in the unit of the response; the response is that of the study. */
+int32_t signature(void *, LacunaText context, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const std::string json = string_of(context);
+        const size_t unit = after(json, R"("unit":")", after(json, R"("layout":)"));
+        const std::string of_response = unit == std::string::npos ? "1" : json.substr(unit, json.find('"', unit) - unit);
+        say(answer, R"({"inputs":[{"name":"amplitude","default":1.0,"low":null,"high":null,"unit":")" + of_response +
+                        R"(","description":"the response at time zero, less the background"},)"
+                        R"({"name":"rate","default":1.0,"low":null,"high":null,"unit":"1/s",)"
+                        R"("description":"the share that decays in a unit of time"}],"resamples":true})");
+    });
+}
+
+/* The times of the response that is asked for. */
+std::vector<double> times(const LacunaCalls &calls)
+{
+    if (calls.inputs.columns != 2) {
+        throw std::runtime_error("expected two inputs, `amplitude` and `rate`");
+    }
+    const std::string json = string_of(calls.about);
+    const size_t first = after(json, R"("axes":[{"name":"time","coordinates":{"grid":{"values":[)");
+    const size_t end = first == std::string::npos ? first : json.find(']', first);
+    if (end == std::string::npos || json.compare(end, 16, R"(],"unit":"s"}}}])") != 0) {
+        throw std::runtime_error("expected a response with one axis, `time` in `s`");
+    }
+    std::vector<double> t;
+    for (const char *at = json.c_str() + first; at < json.c_str() + end;) {
+        char *behind = nullptr;
+        t.push_back(std::strtod(at, &behind));
+        at = behind + 1;
+    }
+    return t;
+}
+
+/* All calls of a batch; the text is a list with `null` for each call that has an answer. What no call can have is an
+ * exception, and ends them all. */
+int32_t predict(void *plugin, const LacunaCalls *calls, double *responses, int32_t *statuses, uint8_t *valid,
+                const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const double background = static_cast<const Plugin *>(plugin)->background;
+        const auto t = times(*calls);
+        std::string said;
+        for (size_t i = 0; i < calls->inputs.rows; ++i) {
+            const double *input = calls->inputs.values + 2 * i;
+            bool finite = true;
+            for (size_t k = 0; k < t.size(); ++k) {
+                const double y = input[0] * std::exp(-input[1] * t[k]) + background;
+                responses[i * t.size() + k] = y;
+                finite = finite && std::isfinite(y);
+            }
+            valid[i] = 1;
+            statuses[i] = finite ? LACUNA_OK : LACUNA_REJECTED;
+            said += said.empty() ? "[" : ",";
+            said += finite ? "null" : R"({"message":"the response is not finite"})";
+        }
+        say(answer, said.empty() ? "[]" : said + "]");
+    });
+}
+
+/* The derivatives of each value (rows) by amplitude and rate (columns). Without a call the question is only whether
+ * there are derivatives. */
+int32_t jacobian(void *, const LacunaCalls *calls, double *slopes, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        if (calls->inputs.rows == 0) {
+            return;
+        }
+        for (const double t : times(*calls)) {
+            const double decayed = std::exp(-calls->inputs.values[1] * t);
+            *slopes++ = decayed;
+            *slopes++ = -t * calls->inputs.values[0] * decayed;
+        }
+    });
+}
+
+/* Texts are read once a batch, not once a run. */
+size_t batch(void *)
+{
+    return 16;
+}
+
+/* ---- the library ---- */
+
+constexpr LacunaComponentFunctions component = [] {
+    LacunaComponentFunctions table{};
+    table.size = sizeof table;
+    table.schema = schema;
+    table.create = create;
+    table.destroy = destroy;
+    table.options = options;
+    return table;
+}();
+
+constexpr LacunaModelFunctions model = [] {
+    LacunaModelFunctions table{};
+    table.size = sizeof table;
+    table.signature = signature;
+    table.predict = predict;
+    table.batch = batch;
+    table.jacobian = jacobian;
+    return table;
+}();
+
+const LacunaEntry entries[] = {LACUNA_ENTRY("model", "skeleton", component, model)};
+
+} // namespace
+
+LACUNA_DECLARE("skeleton", "1.0.0", LACUNA_PROVIDES("model", "skeleton"), entries);

@@ -1,0 +1,408 @@
+/* `skeleton`: columns of text separated by commas or blanks, as instruments write them: one value a line.
+ *
+ * The first line has the names of the columns: one for each axis of the response, one with the name of the response, and
+ * for measurements one called `replicate`. Numbers are in the units of the study; `nan` marks a missing value. Other
+ * columns and other positions are ignored.
+ */
+#include "lacuna_plugin.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+/* What the program may try again with something else. */
+struct Rejected : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+/* Appends to the text of an answer. */
+int32_t say(const LacunaAnswer *answer, std::string_view text, int32_t status = LACUNA_OK)
+{
+    lacuna_say(answer, text.data(), text.size());
+    return status;
+}
+
+/* Runs a function behind the boundary. Nothing may unwind into the program: an exception becomes the text of a status. */
+template <class Act>
+int32_t guard(const LacunaAnswer *answer, Act act) noexcept
+{
+    try {
+        act();
+        return LACUNA_OK;
+    } catch (const Rejected &reason) {
+        return say(answer, reason.what(), LACUNA_REJECTED);
+    } catch (const std::exception &error) {
+        return say(answer, error.what(), LACUNA_STOP);
+    } catch (...) {
+        return say(answer, "an exception of an unknown type", LACUNA_STOP);
+    }
+}
+
+std::string string_of(LacunaText text)
+{
+    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
+}
+
+/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
+size_t after(const std::string &json, const std::string &piece, size_t from = 0)
+{
+    const size_t at = from == std::string::npos ? from : json.find(piece, from);
+    return at == std::string::npos ? at : at + piece.size();
+}
+
+Rejected wrong_option(const std::string &key, const std::string &expected)
+{
+    return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
+                    "\"}]");
+}
+
+/* The text that a JSON string stands for, from behind its opening quote; `at` goes behind the closing one. */
+std::string unquoted(const std::string &json, size_t &at)
+{
+    std::string text;
+    for (; at < json.size() && json[at] != '"'; ++at) {
+        at += json[at] == '\\' && at + 1 < json.size();
+        text += json[at];
+    }
+    ++at;
+    return text;
+}
+
+/* A JSON string. */
+std::string quoted(const std::string &text)
+{
+    std::string json = "\"";
+    for (const char c : text) {
+        if (c == '"' || c == '\\') {
+            json += '\\';
+        }
+        json += c;
+    }
+    return json + '"';
+}
+
+/* ---- the options ---- */
+
+struct Plugin {
+    std::string path; /* empty where there is none */
+
+    explicit Plugin(const std::string &options)
+    {
+        size_t at = after(options, R"("path":)");
+        if (at != std::string::npos) {
+            if (options[at++] != '"') {
+                throw wrong_option("path", "the path of a file");
+            }
+            path = unquoted(options, at);
+        }
+    }
+
+    std::string file(const std::string &source) const
+    {
+        size_t at = after(source, R"("directory":")");
+        if (path.empty() || at == std::string::npos) {
+            throw Rejected("missing key `path`: the file with the measurements");
+        }
+        return path[0] == '/' ? path : unquoted(source, at) + "/" + path;
+    }
+};
+
+int32_t schema(const LacunaAnswer *answer)
+{
+    return say(answer, R"({
+    "type": "object",
+    "description": "Columns of text separated by commas or blanks, one value a line. The first line has the )"
+    R"(names: the axes of the response, the response, and `replicate` for measurements.",
+    "additionalProperties": false,
+    "properties": {
+        "path": {
+            "type": "string",
+            "description": "File with the measurements, relative to the study."
+        }
+    }
+})");
+}
+
+int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+}
+
+void destroy(void *plugin)
+{
+    delete static_cast<Plugin *>(plugin);
+}
+
+/* ---- a file ---- */
+
+using Cells = std::vector<std::string>;
+
+Cells split(const std::string &line)
+{
+    constexpr const char *between = ", \t\r";
+    Cells cells;
+    for (size_t at = line.find_first_not_of(between); at != std::string::npos;) {
+        const size_t end = line.find_first_of(between, at);
+        cells.push_back(line.substr(at, end - at));
+        at = line.find_first_not_of(between, end);
+    }
+    return cells;
+}
+
+struct Sheet {
+    std::string path;
+    Cells names;
+    std::vector<Cells> lines;
+
+    explicit Sheet(const std::string &file) : path(file)
+    {
+        std::ifstream stream(file);
+        std::string line;
+        for (size_t number = 1; std::getline(stream, line); ++number) {
+            if (line.find('\0') != std::string::npos) {
+                throw refusal("line " + std::to_string(number) + ": expected text");
+            }
+            Cells cells = split(line);
+            if (cells.empty()) {
+                continue;
+            }
+            if (!names.empty() && cells.size() != names.size()) {
+                throw refusal("line " + std::to_string(number) + ": expected " + std::to_string(names.size()) +
+                              " columns, found " + std::to_string(cells.size()));
+            }
+            if (names.empty()) {
+                names = std::move(cells);
+            } else {
+                lines.push_back(std::move(cells));
+            }
+        }
+        if (stream.bad() || names.empty()) {
+            throw refusal("it cannot be read, or has no line");
+        }
+    }
+
+    Rejected refusal(const std::string &message) const
+    {
+        return Rejected(R"({"path":)" + quoted(path) + R"(,"message":)" + quoted(message) + "}");
+    }
+
+    size_t column(const std::string &name) const
+    {
+        const auto at = std::find(names.begin(), names.end(), name);
+        if (at == names.end()) {
+            throw refusal("there is no column `" + name + "`; the first one is `" + names[0] + "`");
+        }
+        return static_cast<size_t>(at - names.begin());
+    }
+};
+
+/* The number that a text is; NaN if it is none. */
+double number(const std::string &text)
+{
+    char *end = nullptr;
+    const double x = std::strtod(text.c_str(), &end);
+    return *end == '\0' ? x : std::numeric_limits<double>::quiet_NaN();
+}
+
+/* ---- the response in a file ---- */
+
+/* An axis of the response: its labels, or its numbers. */
+struct Axis {
+    size_t column = 0;
+    Cells labels;
+    std::vector<double> grid;
+
+    /* The index of a cell among them; their number if it is elsewhere. */
+    size_t position(const std::string &cell) const
+    {
+        if (!labels.empty()) {
+            return static_cast<size_t>(std::find(labels.begin(), labels.end(), cell) - labels.begin());
+        }
+        const double x = number(cell);
+        const auto near = [x](double y) { return x == y || std::abs(x - y) <= 1e-9 * std::abs(y); };
+        return static_cast<size_t>(std::find_if(grid.begin(), grid.end(), near) - grid.begin());
+    }
+};
+
+/* A response, in the columns of a file. */
+struct Response {
+    size_t column = 0, size = 1;
+    std::vector<Axis> axes;
+
+    Response(const std::string &json, const Sheet &sheet)
+    {
+        const size_t layout = after(json, R"("layout":)");
+        size_t at = after(json, R"({"name":")", layout == std::string::npos ? 0 : layout);
+        column = sheet.column(unquoted(json, at));
+        for (at = after(json, R"("axes":[)", at); (at = after(json, R"({"name":")", at)) != std::string::npos;) {
+            Axis axis;
+            axis.column = sheet.column(unquoted(json, at));
+            at = json.find('[', after(json, R"("coordinates":{)", at));
+            /* Each entry stands behind a bracket or a comma. */
+            while (at < json.size() && json[at] != ']' && json[at + 1] != ']') {
+                if (json[at + 1] == '"') {
+                    axis.labels.push_back(unquoted(json, at += 2));
+                } else {
+                    axis.grid.push_back(std::strtod(json.c_str() + at + 1, nullptr));
+                    at = json.find_first_of(",]", at + 1);
+                }
+            }
+            size *= axis.labels.size() + axis.grid.size();
+            axes.push_back(std::move(axis));
+        }
+    }
+
+    /* Puts the value of a line into its place among `values`; one that is elsewhere is left out. */
+    void put(const Sheet &sheet, const Cells &cells, std::vector<double> &values) const
+    {
+        size_t index = 0;
+        for (const Axis &axis : axes) {
+            const size_t count = axis.labels.size() + axis.grid.size(), i = axis.position(cells[axis.column]);
+            if (i == count) {
+                return;
+            }
+            index = index * count + i;
+        }
+        const std::string &cell = cells[column];
+        const double y = number(cell);
+        if (std::isinf(y) || (std::isnan(y) && cell != "nan") || !std::isnan(values.at(index))) {
+            throw sheet.refusal("expected one finite number for each place, found `" + cell + "`");
+        }
+        values[index] = y;
+    }
+};
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+int32_t response(void *, LacunaText path, LacunaText layout, size_t outputs, double *out, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const Sheet sheet(string_of(path));
+        const Response wanted(string_of(layout), sheet);
+        std::vector<double> values(outputs, missing);
+        for (const Cells &cells : sheet.lines) {
+            wanted.put(sheet, cells, values);
+        }
+        for (size_t i = 0; i < outputs; ++i) {
+            if (std::isnan(values[i])) {
+                throw sheet.refusal("there is no value " + std::to_string(i + 1) + " of " + std::to_string(outputs));
+            }
+        }
+        std::copy(values.begin(), values.end(), out);
+    });
+}
+
+/* ---- what is in a file ---- */
+
+/* A table has at least two names in a first line that is text. */
+int32_t recognises(void *, LacunaText, LacunaText head)
+{
+    try {
+        const std::string text = string_of(head);
+        return text.find('\0') == std::string::npos && split(text.substr(0, text.find('\n'))).size() > 1;
+    } catch (...) {
+        return 0;
+    }
+}
+
+/* Each column is a variable, with its numbers as a matrix of one column; what is no number, such as a label, is NaN. */
+int32_t inspect(void *, LacunaText path, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const Sheet sheet(string_of(path));
+        const std::string axes = R"(,"on":"column","axes":[["line",)" + std::to_string(sheet.lines.size()) + "]]";
+        std::string variables;
+        for (size_t j = 0; j < sheet.names.size(); ++j) {
+            std::vector<double> values;
+            for (const Cells &cells : sheet.lines) {
+                values.push_back(number(cells[j]));
+            }
+            lacuna_give(answer, values.data(), values.size(), 1);
+            const std::string name = R"({"name":)" + quoted(sheet.names[j]);
+            variables += (j == 0 ? "" : ",") + name + axes + R"(,"columns":[)" + name + "}]}";
+        }
+        say(answer, R"({"format":"columns of text","facts":[],"variables":[)" + variables + "]}");
+    });
+}
+
+/* ---- measurements ---- */
+
+int32_t names_files(void *plugin)
+{
+    return !static_cast<const Plugin *>(plugin)->path.empty();
+}
+
+int32_t files(void *plugin, LacunaText source, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const auto &p = *static_cast<const Plugin *>(plugin);
+        say(answer, p.path.empty() ? "[]" : "[" + quoted(p.file(string_of(source))) + "]");
+    });
+}
+
+int32_t measurements(void *plugin, LacunaText source, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const std::string json = string_of(source);
+        const Sheet sheet(static_cast<const Plugin *>(plugin)->file(json));
+        const Response wanted(json, sheet);
+        const size_t replicate = sheet.column("replicate");
+        Cells names;
+        std::vector<std::vector<double>> rows;
+        for (const Cells &cells : sheet.lines) {
+            const auto at = std::find(names.begin(), names.end(), cells[replicate]);
+            const size_t row = static_cast<size_t>(at - names.begin());
+            if (row == names.size()) {
+                names.push_back(cells[replicate]);
+                rows.emplace_back(wanted.size, missing);
+            }
+            wanted.put(sheet, cells, rows[row]);
+        }
+        std::string list;
+        std::vector<double> values;
+        for (size_t row = 0; row < names.size(); ++row) {
+            list += (row == 0 ? "" : ",") + quoted(names[row]);
+            values.insert(values.end(), rows[row].begin(), rows[row].end());
+        }
+        lacuna_give(answer, values.data(), names.size(), wanted.size);
+        say(answer, "[" + list + "]");
+    });
+}
+
+/* ---- the library ---- */
+
+constexpr LacunaComponentFunctions component = [] {
+    LacunaComponentFunctions table{};
+    table.size = sizeof table;
+    table.schema = schema;
+    table.create = create;
+    table.destroy = destroy;
+    return table;
+}();
+
+constexpr LacunaReaderFunctions reader = [] {
+    LacunaReaderFunctions table{};
+    table.size = sizeof table;
+    table.recognises = recognises;
+    table.inspect = inspect;
+    table.names_files = names_files;
+    table.files = files;
+    table.measurements = measurements;
+    table.response = response;
+    return table;
+}();
+
+const LacunaEntry entries[] = {LACUNA_ENTRY("reader", "skeleton", component, reader)};
+
+} // namespace
+
+LACUNA_DECLARE("skeleton", "1.0.0", LACUNA_PROVIDES("reader", "skeleton"), entries);

@@ -1,0 +1,299 @@
+/* `skeleton`: random-walk Metropolis with step sizes from the prior.
+ *
+ * Each chain proposes a normal step of fixed width and accepts it with the ratio of the densities, or stays: exact from
+ * the first step, without adaptation.
+ *
+ * Reference: Metropolis, Rosenbluth, Rosenbluth, Teller and Teller, J. Chem. Phys. 21 (1953) 1087.
+ */
+#include "lacuna_plugin.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+/* What the program may try again with something else. */
+struct Rejected : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+/* Appends to the text of an answer. */
+int32_t say(const LacunaAnswer *answer, std::string_view text, int32_t status = LACUNA_OK)
+{
+    lacuna_say(answer, text.data(), text.size());
+    return status;
+}
+
+/* Runs a function behind the boundary. Nothing may unwind into the program: an exception becomes the text of a status. */
+template <class Act>
+int32_t guard(const LacunaAnswer *answer, Act act) noexcept
+{
+    try {
+        act();
+        return LACUNA_OK;
+    } catch (const Rejected &reason) {
+        return say(answer, reason.what(), LACUNA_REJECTED);
+    } catch (const std::exception &error) {
+        return say(answer, error.what(), LACUNA_STOP);
+    } catch (...) {
+        return say(answer, "an exception of an unknown type", LACUNA_STOP);
+    }
+}
+
+std::string string_of(LacunaText text)
+{
+    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
+}
+
+/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
+size_t after(const std::string &json, const std::string &piece, size_t from = 0)
+{
+    const size_t at = from == std::string::npos ? from : json.find(piece, from);
+    return at == std::string::npos ? at : at + piece.size();
+}
+
+Rejected wrong_option(const std::string &key, const std::string &expected)
+{
+    return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
+                    "\"}]");
+}
+
+/* A number with all its digits. */
+std::string digits(double x)
+{
+    char text[32];
+    std::snprintf(text, sizeof text, "%.17g", x);
+    return text;
+}
+
+/* ---- the options ---- */
+
+struct Plugin {
+    size_t chains = 4, steps = 10000;
+    double width = 0.5;
+
+    explicit Plugin(const std::string &options)
+    {
+        chains = whole(options, "chains", 2, chains);
+        steps = whole(options, "steps", 1, steps);
+        width = number(options, "width", width);
+        if (!(width > 0.0 && std::isfinite(width))) {
+            throw wrong_option("width", "a number above 0");
+        }
+    }
+
+private:
+    /* What is no number reads as zero. */
+    static double number(const std::string &options, const std::string &key, double usual)
+    {
+        const size_t at = after(options, "\"" + key + "\":");
+        return at == std::string::npos ? usual : std::strtod(options.c_str() + at, nullptr);
+    }
+
+    static size_t whole(const std::string &options, const std::string &key, size_t least, size_t usual)
+    {
+        const double found = number(options, key, static_cast<double>(usual));
+        if (!(found >= static_cast<double>(least) && found <= 1e15 && std::floor(found) == found)) {
+            throw wrong_option(key, "a whole number from " + std::to_string(least));
+        }
+        return static_cast<size_t>(found);
+    }
+};
+
+int32_t schema(const LacunaAnswer *answer)
+{
+    return say(answer, R"({
+    "type": "object",
+    "description": "Random-walk Metropolis: each chain proposes a normal step of fixed width and accepts it )"
+    R"(with the ratio of the densities, or stays.",
+    "additionalProperties": false,
+    "properties": {
+        "chains": {
+            "type": "integer", "minimum": 2, "default": 4,
+            "description": "Number of independent chains."
+        },
+        "steps": {
+            "type": "integer", "minimum": 1, "default": 10000,
+            "description": "Number of steps of each chain."
+        },
+        "width": {
+            "type": "number", "exclusiveMinimum": 0, "default": 0.5,
+            "description": "Standard deviation of a proposal in each unknown, as a fraction of that of its prior."
+        }
+    }
+})");
+}
+
+int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+}
+
+void destroy(void *plugin)
+{
+    delete static_cast<Plugin *>(plugin);
+}
+
+/* All options with their defaults, which the record of a run keeps. */
+int32_t options(void *plugin, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const auto &p = *static_cast<const Plugin *>(plugin);
+        say(answer, R"({"chains":)" + std::to_string(p.chains) + R"(,"steps":)" + std::to_string(p.steps) +
+                        R"(,"width":)" + digits(p.width) + "}");
+    });
+}
+
+/* ---- the sampler ---- */
+
+int32_t plan(void *plugin, size_t, LacunaPlan *out, const LacunaAnswer *)
+{
+    const auto &p = *static_cast<const Plugin *>(plugin);
+    *out = {p.chains, p.steps, 0, 0};
+    return LACUNA_OK;
+}
+
+/* The text of the answer has the program's reason already when it does not answer. */
+void demand(int32_t status)
+{
+    if (status != LACUNA_OK) {
+        throw std::runtime_error("");
+    }
+}
+
+std::vector<double> log_density(const LacunaTarget &target, const double *points, size_t rows,
+                                const LacunaAnswer *answer)
+{
+    std::vector<double> values(rows);
+    demand(target.functions->log_density(target.target, {points, rows, target.dimension}, values.data(), answer));
+    return values;
+}
+
+/* Half the distance between the 16 % and 84 % quantiles of the prior of each unknown. */
+std::vector<double> widths(const LacunaTarget &target, const LacunaAnswer *answer)
+{
+    constexpr size_t count = 1000;
+    /* Any fixed key serves: the draws only give a width. */
+    const LacunaKey key{{1, 2, 3, 4}};
+    std::vector<double> draws(count * target.dimension), column(count), found;
+    demand(target.functions->prior_draws(target.target, count, key, draws.data(), answer));
+    for (size_t j = 0; j < target.dimension; ++j) {
+        for (size_t i = 0; i < count; ++i) {
+            column[i] = draws[i * target.dimension + j];
+        }
+        std::sort(column.begin(), column.end());
+        found.push_back(0.5 * (column[840] - column[160]));
+    }
+    return found;
+}
+
+/* The memory of a run is a JSON list of the widths. */
+std::string written(const std::vector<double> &widths)
+{
+    std::string list;
+    for (const double width : widths) {
+        list += (list.empty() ? "[" : ",") + digits(width);
+    }
+    return list.empty() ? "[]" : list + "]";
+}
+
+std::vector<double> read(const std::string &memory)
+{
+    std::vector<double> widths;
+    /* Each number stands behind a bracket or a comma. */
+    for (const char *at = memory.c_str(); *at == '[' || *at == ',';) {
+        char *end = nullptr;
+        widths.push_back(std::strtod(at + 1, &end));
+        at = end;
+    }
+    return widths;
+}
+
+int32_t start(void *plugin, const LacunaTarget *target, LacunaState *state, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const size_t chains = static_cast<const Plugin *>(plugin)->chains;
+        if (state->chains != chains || state->dimension != target->dimension) {
+            throw std::runtime_error("expected " + std::to_string(chains) + " starting points, found " +
+                                     std::to_string(state->chains));
+        }
+        const auto density = log_density(*target, state->points, chains, answer);
+        if (!std::all_of(density.begin(), density.end(), [](double d) { return std::isfinite(d); })) {
+            throw std::runtime_error("a chain starts where the density is zero");
+        }
+        std::copy(density.begin(), density.end(), state->log_density);
+        std::fill_n(state->accepted, chains, uint8_t{0});
+        state->evaluations = chains;
+        say(answer, written(widths(*target, answer)));
+    });
+}
+
+/* All that is drawn follows from the key of the call alone. */
+int32_t step(void *plugin, const LacunaTarget *target, LacunaState *state, LacunaKey key, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const double width = static_cast<const Plugin *>(plugin)->width;
+        const size_t chains = state->chains, dimension = state->dimension;
+        const auto widths = read(string_of(state->memory));
+        std::mt19937_64 random(key.words[0]);
+        std::normal_distribution<double> normal;
+        std::exponential_distribution<double> below;
+        std::vector<double> tried(state->points, state->points + chains * dimension);
+        for (size_t at = 0; at < tried.size(); ++at) {
+            tried[at] += width * widths.at(at % dimension) * normal(random);
+        }
+        const auto density = log_density(*target, tried.data(), chains, answer);
+        state->evaluations += chains;
+        for (size_t i = 0; i < chains; ++i) {
+            /* The logarithm of a uniform number is that below zero. */
+            state->accepted[i] = -below(random) < density[i] - state->log_density[i];
+            if (state->accepted[i] != 0) {
+                std::copy_n(&tried[i * dimension], dimension, state->points + i * dimension);
+                state->log_density[i] = density[i];
+            }
+        }
+    });
+}
+
+/* A run may end after any number of steps. */
+int32_t steps_are_draws(void *, uint8_t *draws, const LacunaAnswer *)
+{
+    *draws = 1;
+    return LACUNA_OK;
+}
+
+/* ---- the library ---- */
+
+constexpr LacunaComponentFunctions component = [] {
+    LacunaComponentFunctions table{};
+    table.size = sizeof table;
+    table.schema = schema;
+    table.create = create;
+    table.destroy = destroy;
+    table.options = options;
+    return table;
+}();
+
+constexpr LacunaSamplerFunctions sampler = [] {
+    LacunaSamplerFunctions table{};
+    table.size = sizeof table;
+    table.plan = plan;
+    table.start = start;
+    table.step = step;
+    table.steps_are_draws = steps_are_draws;
+    return table;
+}();
+
+const LacunaEntry entries[] = {LACUNA_ENTRY("sampler", "skeleton", component, sampler)};
+
+} // namespace
+
+LACUNA_DECLARE("skeleton", "1.0.0", LACUNA_PROVIDES("sampler", "skeleton"), entries);

@@ -1,0 +1,425 @@
+/* `skeleton`: Gaussian functions around the runs, with weights by ridge regression.
+ *
+ * With u the parameters scaled to -1..1 over the runs and y_0 the mean response,
+ *
+ *     y(u) = y_0 + sum_r k(|u - u_r|) w_r,    k(d) = exp(-d^2 / (2 length^2)),    (K + ridge I) w = y - y_0
+ *
+ * and the leave-one-out residual of run r is w_r / ((K + ridge I)^-1)_rr (Rippa, Adv. Comput. Math. 11 (1999) 193).
+ */
+#include "lacuna_plugin.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace {
+
+/* What the program may try again with something else. */
+struct Rejected : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+/* Appends to the text of an answer. */
+int32_t say(const LacunaAnswer *answer, std::string_view text, int32_t status = LACUNA_OK)
+{
+    lacuna_say(answer, text.data(), text.size());
+    return status;
+}
+
+/* Runs a function behind the boundary. Nothing may unwind into the program: an exception becomes the text of a status. */
+template <class Act>
+int32_t guard(const LacunaAnswer *answer, Act act) noexcept
+{
+    try {
+        act();
+        return LACUNA_OK;
+    } catch (const Rejected &reason) {
+        return say(answer, reason.what(), LACUNA_REJECTED);
+    } catch (const std::exception &error) {
+        return say(answer, error.what(), LACUNA_STOP);
+    } catch (...) {
+        return say(answer, "an exception of an unknown type", LACUNA_STOP);
+    }
+}
+
+std::string string_of(LacunaText text)
+{
+    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
+}
+
+/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
+size_t after(const std::string &json, const std::string &piece, size_t from = 0)
+{
+    const size_t at = from == std::string::npos ? from : json.find(piece, from);
+    return at == std::string::npos ? at : at + piece.size();
+}
+
+Rejected wrong_option(const std::string &key, const std::string &expected)
+{
+    return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
+                    "\"}]");
+}
+
+/* A number with all its digits. */
+std::string digits(double x)
+{
+    char text[32];
+    std::snprintf(text, sizeof text, "%.17g", x);
+    return text;
+}
+
+/* ---- the options ---- */
+
+struct Plugin {
+    double length = 1.0;
+
+    explicit Plugin(const std::string &options)
+    {
+        const size_t at = after(options, R"("length":)");
+        if (at != std::string::npos) {
+            /* What is no number reads as zero. */
+            length = std::strtod(options.c_str() + at, nullptr);
+        }
+        if (!(length > 0.0 && std::isfinite(length))) {
+            throw wrong_option("length", "a number above 0");
+        }
+    }
+};
+
+int32_t schema(const LacunaAnswer *answer)
+{
+    return say(answer, R"({
+    "type": "object",
+    "description": "Gaussian functions around the runs, for smooth responses of few parameters.",
+    "additionalProperties": false,
+    "properties": {
+        "length": {
+            "type": "number", "exclusiveMinimum": 0, "default": 1.0,
+            "description": "Standard deviation of the Gaussian functions, in half ranges of the parameters."
+        }
+    }
+})");
+}
+
+int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+}
+
+void destroy(void *plugin)
+{
+    delete static_cast<Plugin *>(plugin);
+}
+
+/* All options with their defaults, which the record of a run keeps. */
+int32_t options(void *plugin, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        say(answer, R"({"length":)" + digits(static_cast<const Plugin *>(plugin)->length) + "}");
+    });
+}
+
+/* ---- the emulator ---- */
+
+using Numbers = std::vector<double>;
+
+/* The inverse of a positive definite matrix in place, by Gauss and Jordan. */
+void invert(Numbers &a, size_t n)
+{
+    for (size_t k = 0; k < n; ++k) {
+        const double pivot = a[k * n + k];
+        if (!(pivot > 0.0)) {
+            throw std::runtime_error("the kernel matrix is not positive definite: choose a smaller `length`");
+        }
+        a[k * n + k] = 1.0;
+        for (size_t j = 0; j < n; ++j) {
+            a[k * n + j] /= pivot;
+        }
+        for (size_t i = 0; i < n; ++i) {
+            const double times = a[i * n + k];
+            if (i != k) {
+                a[i * n + k] = 0.0;
+                for (size_t j = 0; j < n; ++j) {
+                    a[i * n + j] -= times * a[k * n + j];
+                }
+            }
+        }
+    }
+}
+
+/* All numbers lie in one block, which is what `save` answers. */
+class Emulator {
+public:
+    const size_t dimension, outputs, runs;
+
+    /* The counts are floats, as they are saved. */
+    Emulator(double d, double o, double r)
+        : dimension(static_cast<size_t>(d)), outputs(static_cast<size_t>(o)), runs(static_cast<size_t>(r)),
+          numbers_(static_cast<size_t>(size(d, o, r)))
+    {
+        numbers_[0] = d;
+        numbers_[1] = o;
+        numbers_[2] = r;
+        double *next = &numbers_[3];
+        const auto take = [&next](size_t count) { return std::exchange(next, next + count); };
+        length_ = take(1);
+        centre_ = take(dimension);
+        half_ = take(dimension);
+        points_ = take(runs * dimension);
+        mean_ = take(outputs);
+        weights_ = take(runs * outputs);
+        relative_ = take(outputs);
+        residuals_ = take(runs * outputs);
+    }
+
+    Emulator(const Emulator &) = delete;
+
+    /* The number of all numbers, as a float because it may be large. */
+    static double size(double d, double o, double r)
+    {
+        return 4.0 + (2.0 + r) * d + 2.0 * (1.0 + r) * o;
+    }
+
+    void fit(const LacunaTraining &training, double length)
+    {
+        *length_ = length;
+        scale(training.points.values);
+        Numbers matrix(runs * runs);
+        for (size_t i = 0; i < runs; ++i) {
+            for (size_t k = 0; k < runs; ++k) {
+                matrix[i * runs + k] = kernel(training.points.values + i * dimension, k) + (i == k ? 1e-6 : 0.0);
+            }
+        }
+        invert(matrix, runs);
+        for (size_t o = 0; o < outputs; ++o) {
+            fit_output(training.responses.values, matrix, o);
+        }
+    }
+
+    Numbers &numbers() { return numbers_; }
+    const double *relative() const { return relative_; }
+    const double *residuals() const { return residuals_; }
+
+    void mean(const double *point, double *values) const
+    {
+        std::copy_n(mean_, outputs, values);
+        for (size_t r = 0; r < runs; ++r) {
+            const double k = kernel(point, r);
+            for (size_t o = 0; o < outputs; ++o) {
+                values[o] += k * weights_[r * outputs + o];
+            }
+        }
+    }
+
+    void jacobian(const double *point, double *out) const
+    {
+        std::fill_n(out, outputs * dimension, 0.0);
+        for (size_t r = 0; r < runs; ++r) {
+            const double k = kernel(point, r);
+            for (size_t j = 0; j < dimension; ++j) {
+                const double slope = -k * apart(point, r, j) / (half_[j] * *length_);
+                for (size_t o = 0; o < outputs; ++o) {
+                    out[o * dimension + j] += slope * weights_[r * outputs + o];
+                }
+            }
+        }
+    }
+
+private:
+    /* The difference of a point from a run in one parameter, in lengths. */
+    double apart(const double *point, size_t run, size_t j) const
+    {
+        return ((point[j] - centre_[j]) / half_[j] - points_[run * dimension + j]) / *length_;
+    }
+
+    double kernel(const double *point, size_t run) const
+    {
+        double square = 0.0;
+        for (size_t j = 0; j < dimension; ++j) {
+            square += apart(point, run, j) * apart(point, run, j);
+        }
+        return std::exp(-0.5 * square);
+    }
+
+    void scale(const double *points)
+    {
+        for (size_t j = 0; j < dimension; ++j) {
+            double low = points[j], high = points[j];
+            for (size_t i = 1; i < runs; ++i) {
+                low = std::min(low, points[i * dimension + j]);
+                high = std::max(high, points[i * dimension + j]);
+            }
+            centre_[j] = 0.5 * (low + high);
+            half_[j] = 0.5 * (high - low);
+            if (!(half_[j] > 0.0)) {
+                throw std::runtime_error("all runs have the same value of parameter " + std::to_string(j + 1));
+            }
+            for (size_t i = 0; i < runs; ++i) {
+                points_[i * dimension + j] = (points[i * dimension + j] - centre_[j]) / half_[j];
+            }
+        }
+    }
+
+    /* Mean, weights and errors of one output. */
+    void fit_output(const double *responses, const Numbers &inverse, size_t o)
+    {
+        const auto y = [=](size_t run) { return responses[run * outputs + o]; };
+        double mean = 0.0, spread = 0.0, squares = 0.0;
+        for (size_t i = 0; i < runs; ++i) {
+            /* About the first run, so that a constant has exactly itself as its mean. */
+            mean += (y(i) - y(0)) / static_cast<double>(runs);
+        }
+        mean += y(0);
+        for (size_t i = 0; i < runs; ++i) {
+            double weight = 0.0;
+            for (size_t k = 0; k < runs; ++k) {
+                weight += inverse[i * runs + k] * (y(k) - mean);
+            }
+            const double left = weight / inverse[i * runs + i];
+            weights_[i * outputs + o] = weight;
+            residuals_[i * outputs + o] = left;
+            spread += (y(i) - mean) * (y(i) - mean);
+            squares += left * left;
+        }
+        mean_[o] = mean;
+        relative_[o] = spread > 0.0 ? squares / spread : 0.0;
+    }
+
+    Numbers numbers_;
+    double *length_, *centre_, *half_, *points_, *mean_, *weights_, *relative_, *residuals_;
+};
+
+Emulator &of(void *object)
+{
+    return *static_cast<Emulator *>(object);
+}
+
+void end_emulator(void *object)
+{
+    delete static_cast<Emulator *>(object);
+}
+
+int32_t mean(void *object, LacunaNumbers points, double *values, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const Emulator &e = of(object);
+        for (size_t i = 0; i < points.rows; ++i) {
+            e.mean(points.values + i * e.dimension, values + i * e.outputs);
+        }
+    });
+}
+
+int32_t jacobian(void *object, LacunaNumbers point, double *out, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] { of(object).jacobian(point.values, out); });
+}
+
+int32_t fit_error(void *object, const LacunaAnswer *answer)
+{
+    const Emulator &e = of(object);
+    lacuna_give(answer, e.relative(), 1, e.outputs);
+    lacuna_give(answer, e.residuals(), e.runs, e.outputs);
+    return LACUNA_OK;
+}
+
+int32_t save(void *object, const LacunaAnswer *answer)
+{
+    const Numbers &numbers = of(object).numbers();
+    lacuna_say(answer, reinterpret_cast<const char *>(numbers.data()), numbers.size() * sizeof numbers[0]);
+    return LACUNA_OK;
+}
+
+constexpr LacunaEmulatorFunctions emulator_functions = [] {
+    LacunaEmulatorFunctions table{};
+    table.size = sizeof table;
+    table.destroy = end_emulator;
+    table.mean = mean;
+    table.jacobian = jacobian;
+    table.fit_error = fit_error;
+    table.save = save;
+    return table;
+}();
+
+void hand_over(std::unique_ptr<Emulator> emulator, LacunaEmulator *out)
+{
+    out->size = sizeof *out;
+    out->functions = &emulator_functions;
+    out->dimension = emulator->dimension;
+    out->outputs = emulator->outputs;
+    out->emulator = emulator.release();
+}
+
+int32_t load(void *, LacunaText bytes, LacunaEmulator *out, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        double counts[3] = {-1.0, -1.0, -1.0};
+        if (bytes.length >= sizeof counts) {
+            std::memcpy(counts, bytes.bytes, sizeof counts);
+        }
+        const auto is_count = [](double x) { return x >= 0.0 && x <= 1e9 && std::floor(x) == x; };
+        const auto [dimension, outputs, runs] = counts;
+        if (!std::all_of(counts, counts + 3, is_count) ||
+            Emulator::size(dimension, outputs, runs) * sizeof(double) != static_cast<double>(bytes.length)) {
+            throw std::runtime_error("these bytes are no emulator");
+        }
+        auto emulator = std::make_unique<Emulator>(dimension, outputs, runs);
+        Numbers &numbers = emulator->numbers();
+        std::memcpy(numbers.data(), bytes.bytes, bytes.length);
+        hand_over(std::move(emulator), out);
+    });
+}
+
+int32_t fit(void *plugin, const LacunaTraining *training, LacunaKey, const LacunaProgress *progress,
+            LacunaEmulator *out, const LacunaAnswer *answer)
+{
+    return guard(answer, [&] {
+        const LacunaNumbers points = training->points, responses = training->responses;
+        if (points.rows < 2 || points.rows != responses.rows) {
+            throw std::runtime_error("expected at least two runs, each with a response");
+        }
+        for (const LacunaNumbers &numbers : {points, responses}) {
+            const double *end = numbers.values + numbers.rows * numbers.columns;
+            if (!std::all_of(numbers.values, end, [](double x) { return std::isfinite(x); })) {
+                throw std::runtime_error("a run has a value that is not finite");
+            }
+        }
+        auto emulator = std::make_unique<Emulator>(points.columns, responses.columns, points.rows);
+        emulator->fit(*training, static_cast<const Plugin *>(plugin)->length);
+        progress->functions->add(progress->progress, responses.columns);
+        hand_over(std::move(emulator), out);
+    });
+}
+
+/* ---- the library ---- */
+
+constexpr LacunaComponentFunctions component = [] {
+    LacunaComponentFunctions table{};
+    table.size = sizeof table;
+    table.schema = schema;
+    table.create = create;
+    table.destroy = destroy;
+    table.options = options;
+    return table;
+}();
+
+constexpr LacunaSurrogateFunctions surrogate = [] {
+    LacunaSurrogateFunctions table{};
+    table.size = sizeof table;
+    table.fit = fit;
+    table.load = load;
+    return table;
+}();
+
+const LacunaEntry entries[] = {LACUNA_ENTRY("surrogate", "skeleton", component, surrogate)};
+
+} // namespace
+
+LACUNA_DECLARE("skeleton", "1.0.0", LACUNA_PROVIDES("surrogate", "skeleton"), entries);
