@@ -9,6 +9,8 @@ mod browser;
 mod campaign;
 mod celsius;
 mod commands;
+#[cfg(unix)]
+mod compiled;
 mod convert;
 mod coverage;
 mod cut;
