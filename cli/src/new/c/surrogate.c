@@ -73,14 +73,6 @@ static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer
     return LACUNA_OK;
 }
 
-/* All options with their defaults, which the record of a run keeps. */
-static int32_t options(void *plugin, const LacunaAnswer *answer)
-{
-    char text[64];
-    snprintf(text, sizeof text, "{\"length\":%.17g}", ((const Plugin *)plugin)->length);
-    return say(answer, LACUNA_OK, text);
-}
-
 /* ---- the emulator ---- */
 
 /* All numbers lie in one block, which is what `save` writes. */
@@ -389,7 +381,7 @@ static int32_t fit(void *plugin, const LacunaTraining *training, LacunaKey key, 
 /* ---- the library ---- */
 
 static const LacunaComponentFunctions component = {
-    .size = sizeof(LacunaComponentFunctions), .schema = schema, .create = create, .destroy = free, .options = options
+    .size = sizeof(LacunaComponentFunctions), .schema = schema, .create = create, .destroy = free
 };
 
 static const LacunaSurrogateFunctions surrogate = {

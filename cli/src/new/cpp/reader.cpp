@@ -124,10 +124,7 @@ int32_t schema(const LacunaAnswer *answer)
     R"(names: the axes of the response, the response, and `replicate` for measurements.",
     "additionalProperties": false,
     "properties": {
-        "path": {
-            "type": "string",
-            "description": "File with the measurements, relative to the study."
-        }
+        "path": {"type": "string", "description": "File with the measurements, relative to the study."}
     }
 })");
 }
@@ -172,16 +169,13 @@ struct Sheet {
                 throw refusal("line " + std::to_string(number) + ": expected text");
             }
             Cells cells = split(line);
-            if (cells.empty()) {
-                continue;
-            }
-            if (!names.empty() && cells.size() != names.size()) {
+            if (!names.empty() && !cells.empty() && cells.size() != names.size()) {
                 throw refusal("line " + std::to_string(number) + ": expected " + std::to_string(names.size()) +
                               " columns, found " + std::to_string(cells.size()));
             }
             if (names.empty()) {
                 names = std::move(cells);
-            } else {
+            } else if (!cells.empty()) {
                 lines.push_back(std::move(cells));
             }
         }
@@ -205,12 +199,14 @@ struct Sheet {
     }
 };
 
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
 /* The number that a text is; NaN if it is none. */
 double number(const std::string &text)
 {
     char *end = nullptr;
     const double x = std::strtod(text.c_str(), &end);
-    return *end == '\0' ? x : std::numeric_limits<double>::quiet_NaN();
+    return *end == '\0' ? x : missing;
 }
 
 /* ---- the response in a file ---- */
@@ -220,7 +216,6 @@ struct Axis {
     size_t column = 0;
     Cells labels;
     std::vector<double> grid;
-
     /* The index of a cell among them; their number if it is elsewhere. */
     size_t position(const std::string &cell) const
     {
@@ -272,16 +267,13 @@ struct Response {
             }
             index = index * count + i;
         }
-        const std::string &cell = cells[column];
-        const double y = number(cell);
-        if (std::isinf(y) || (std::isnan(y) && cell != "nan") || !std::isnan(values.at(index))) {
-            throw sheet.refusal("expected one finite number for each place, found `" + cell + "`");
+        const double y = number(cells[column]);
+        if (std::isinf(y) || (std::isnan(y) && cells[column] != "nan") || !std::isnan(values.at(index))) {
+            throw sheet.refusal("expected one finite number for each place, found `" + cells[column] + "`");
         }
         values[index] = y;
     }
 };
-
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 int32_t response(void *, LacunaText path, LacunaText layout, size_t outputs, double *out, const LacunaAnswer *answer)
 {

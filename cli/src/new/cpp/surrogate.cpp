@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
@@ -68,14 +67,6 @@ Rejected wrong_option(const std::string &key, const std::string &expected)
                     "\"}]");
 }
 
-/* A number with all its digits. */
-std::string digits(double x)
-{
-    char text[32];
-    std::snprintf(text, sizeof text, "%.17g", x);
-    return text;
-}
-
 /* ---- the options ---- */
 
 struct Plugin {
@@ -119,14 +110,6 @@ void destroy(void *plugin)
     delete static_cast<Plugin *>(plugin);
 }
 
-/* All options with their defaults, which the record of a run keeps. */
-int32_t options(void *plugin, const LacunaAnswer *answer)
-{
-    return guard(answer, [&] {
-        say(answer, R"({"length":)" + digits(static_cast<const Plugin *>(plugin)->length) + "}");
-    });
-}
-
 /* ---- the emulator ---- */
 
 using Numbers = std::vector<double>;
@@ -156,31 +139,31 @@ void invert(Numbers &a, size_t n)
 }
 
 /* All numbers lie in one block, which is what `save` answers. */
-class Emulator {
-public:
+struct Emulator {
     const size_t dimension, outputs, runs;
+    Numbers numbers;
+    /* Where in it lie the length of the functions, the range of each parameter, the scaled points, the mean of each
+     * output, the weights (runs x outputs), the error of each output and the residuals (runs x outputs). */
+    double *length, *centre, *half, *points, *mean_response, *weights, *relative, *residuals;
 
+    Emulator(const Emulator &) = delete;
     /* The counts are floats, as they are saved. */
     Emulator(double d, double o, double r)
         : dimension(static_cast<size_t>(d)), outputs(static_cast<size_t>(o)), runs(static_cast<size_t>(r)),
-          numbers_(static_cast<size_t>(size(d, o, r)))
+          numbers(static_cast<size_t>(size(d, o, r)))
     {
-        numbers_[0] = d;
-        numbers_[1] = o;
-        numbers_[2] = r;
-        double *next = &numbers_[3];
+        const double counts[] = {d, o, r};
+        double *next = std::copy(counts, counts + 3, numbers.data());
         const auto take = [&next](size_t count) { return std::exchange(next, next + count); };
-        length_ = take(1);
-        centre_ = take(dimension);
-        half_ = take(dimension);
-        points_ = take(runs * dimension);
-        mean_ = take(outputs);
-        weights_ = take(runs * outputs);
-        relative_ = take(outputs);
-        residuals_ = take(runs * outputs);
+        length = take(1);
+        centre = take(dimension);
+        half = take(dimension);
+        points = take(runs * dimension);
+        mean_response = take(outputs);
+        weights = take(runs * outputs);
+        relative = take(outputs);
+        residuals = take(runs * outputs);
     }
-
-    Emulator(const Emulator &) = delete;
 
     /* The number of all numbers, as a float because it may be large. */
     static double size(double d, double o, double r)
@@ -188,9 +171,9 @@ public:
         return 4.0 + (2.0 + r) * d + 2.0 * (1.0 + r) * o;
     }
 
-    void fit(const LacunaTraining &training, double length)
+    void fit(const LacunaTraining &training, double given_length)
     {
-        *length_ = length;
+        *length = given_length;
         scale(training.points.values);
         Numbers matrix(runs * runs);
         for (size_t i = 0; i < runs; ++i) {
@@ -204,17 +187,13 @@ public:
         }
     }
 
-    Numbers &numbers() { return numbers_; }
-    const double *relative() const { return relative_; }
-    const double *residuals() const { return residuals_; }
-
     void mean(const double *point, double *values) const
     {
-        std::copy_n(mean_, outputs, values);
+        std::copy_n(mean_response, outputs, values);
         for (size_t r = 0; r < runs; ++r) {
             const double k = kernel(point, r);
             for (size_t o = 0; o < outputs; ++o) {
-                values[o] += k * weights_[r * outputs + o];
+                values[o] += k * weights[r * outputs + o];
             }
         }
     }
@@ -225,19 +204,18 @@ public:
         for (size_t r = 0; r < runs; ++r) {
             const double k = kernel(point, r);
             for (size_t j = 0; j < dimension; ++j) {
-                const double slope = -k * apart(point, r, j) / (half_[j] * *length_);
+                const double slope = -k * apart(point, r, j) / (half[j] * *length);
                 for (size_t o = 0; o < outputs; ++o) {
-                    out[o * dimension + j] += slope * weights_[r * outputs + o];
+                    out[o * dimension + j] += slope * weights[r * outputs + o];
                 }
             }
         }
     }
 
-private:
     /* The difference of a point from a run in one parameter, in lengths. */
     double apart(const double *point, size_t run, size_t j) const
     {
-        return ((point[j] - centre_[j]) / half_[j] - points_[run * dimension + j]) / *length_;
+        return ((point[j] - centre[j]) / half[j] - points[run * dimension + j]) / *length;
     }
 
     double kernel(const double *point, size_t run) const
@@ -249,21 +227,21 @@ private:
         return std::exp(-0.5 * square);
     }
 
-    void scale(const double *points)
+    void scale(const double *given)
     {
         for (size_t j = 0; j < dimension; ++j) {
-            double low = points[j], high = points[j];
+            double low = given[j], high = given[j];
             for (size_t i = 1; i < runs; ++i) {
-                low = std::min(low, points[i * dimension + j]);
-                high = std::max(high, points[i * dimension + j]);
+                low = std::min(low, given[i * dimension + j]);
+                high = std::max(high, given[i * dimension + j]);
             }
-            centre_[j] = 0.5 * (low + high);
-            half_[j] = 0.5 * (high - low);
-            if (!(half_[j] > 0.0)) {
+            centre[j] = 0.5 * (low + high);
+            half[j] = 0.5 * (high - low);
+            if (!(half[j] > 0.0)) {
                 throw std::runtime_error("all runs have the same value of parameter " + std::to_string(j + 1));
             }
             for (size_t i = 0; i < runs; ++i) {
-                points_[i * dimension + j] = (points[i * dimension + j] - centre_[j]) / half_[j];
+                points[i * dimension + j] = (given[i * dimension + j] - centre[j]) / half[j];
             }
         }
     }
@@ -284,17 +262,14 @@ private:
                 weight += inverse[i * runs + k] * (y(k) - mean);
             }
             const double left = weight / inverse[i * runs + i];
-            weights_[i * outputs + o] = weight;
-            residuals_[i * outputs + o] = left;
+            weights[i * outputs + o] = weight;
+            residuals[i * outputs + o] = left;
             spread += (y(i) - mean) * (y(i) - mean);
             squares += left * left;
         }
-        mean_[o] = mean;
-        relative_[o] = spread > 0.0 ? squares / spread : 0.0;
+        mean_response[o] = mean;
+        relative[o] = spread > 0.0 ? squares / spread : 0.0;
     }
-
-    Numbers numbers_;
-    double *length_, *centre_, *half_, *points_, *mean_, *weights_, *relative_, *residuals_;
 };
 
 Emulator &of(void *object)
@@ -325,14 +300,14 @@ int32_t jacobian(void *object, LacunaNumbers point, double *out, const LacunaAns
 int32_t fit_error(void *object, const LacunaAnswer *answer)
 {
     const Emulator &e = of(object);
-    lacuna_give(answer, e.relative(), 1, e.outputs);
-    lacuna_give(answer, e.residuals(), e.runs, e.outputs);
+    lacuna_give(answer, e.relative, 1, e.outputs);
+    lacuna_give(answer, e.residuals, e.runs, e.outputs);
     return LACUNA_OK;
 }
 
 int32_t save(void *object, const LacunaAnswer *answer)
 {
-    const Numbers &numbers = of(object).numbers();
+    const Numbers &numbers = of(object).numbers;
     lacuna_say(answer, reinterpret_cast<const char *>(numbers.data()), numbers.size() * sizeof numbers[0]);
     return LACUNA_OK;
 }
@@ -371,7 +346,7 @@ int32_t load(void *, LacunaText bytes, LacunaEmulator *out, const LacunaAnswer *
             throw std::runtime_error("these bytes are no emulator");
         }
         auto emulator = std::make_unique<Emulator>(dimension, outputs, runs);
-        Numbers &numbers = emulator->numbers();
+        Numbers &numbers = emulator->numbers;
         std::memcpy(numbers.data(), bytes.bytes, bytes.length);
         hand_over(std::move(emulator), out);
     });
@@ -406,7 +381,6 @@ constexpr LacunaComponentFunctions component = [] {
     table.schema = schema;
     table.create = create;
     table.destroy = destroy;
-    table.options = options;
     return table;
 }();
 
