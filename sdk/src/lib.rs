@@ -24,6 +24,8 @@ pub use lacuna_linalg as linalg;
 #[doc(hidden)]
 pub mod declaration;
 mod guest;
+#[cfg(test)]
+mod tests;
 
 /// Exports plugins from a library: for each its kind, its name in a study and its options, which implement the kind.
 ///

@@ -102,3 +102,48 @@ pub fn table(bytes: &[u8]) -> Result<(), Refusal> {
     // SAFETY: there are as many bytes as the table says, and words of functions are null or lead to one.
     unsafe { copied::<ModelFunctions>(words.as_ptr().cast()) }.map(|_| ())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bytes of a linear congruential generator (Knuth, MMIX), small values among them, which are the codes of parts.
+    fn bytes(seed: u64, count: usize) -> Vec<u8> {
+        let mut state = seed;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 56) as u8
+        };
+        (0..count).map(|_| if next() < 128 { next() % 5 } else { next() }).collect()
+    }
+
+    #[test]
+    fn whatever_is_answered_is_refused_or_whole() {
+        for seed in 0..200 {
+            match reply(&bytes(seed, 60)) {
+                Ok(reply) => {
+                    for matrix in &reply.matrices {
+                        assert_eq!(matrix.as_slice().len(), matrix.rows() * matrix.columns());
+                    }
+                }
+                Err(refusal) => assert_ne!(refusal.status, crate::status::OK, "{refusal:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn whatever_a_table_says_of_itself_is_refused_or_taken() {
+        for seed in 0..200 {
+            let mut bytes = bytes(seed, 80);
+            // Half of the tables have a size that is possible.
+            if seed % 2 == 0 {
+                bytes[..8].copy_from_slice(&(8 * (seed % 64)).to_le_bytes());
+            }
+            if let Err(refusal) = table(&bytes) {
+                assert!(!refusal.message.is_empty());
+            }
+        }
+    }
+}

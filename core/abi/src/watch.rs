@@ -24,6 +24,7 @@ pub fn ready() {
 
 #[cfg(unix)]
 mod system {
+    use std::ffi::c_void;
     use std::sync::Once;
 
     use super::INSIDE;
@@ -36,7 +37,7 @@ mod system {
     unsafe extern "C" {
         fn atexit(handler: extern "C" fn()) -> i32;
         fn signal(number: i32, handler: extern "C" fn(i32)) -> usize;
-        fn write(descriptor: i32, bytes: *const u8, count: usize) -> isize;
+        fn write(descriptor: i32, bytes: *const c_void, count: usize) -> isize;
         fn _exit(code: i32) -> !;
     }
 
@@ -73,7 +74,7 @@ mod system {
             [(b"error: ".as_ptr(), 7), (name, length), (what.as_ptr(), what.len())]
         {
             // SAFETY: the bytes are there: a name lives until its call returns, and this is inside the call.
-            unsafe { write(STANDARD_ERROR, bytes, count) };
+            unsafe { write(STANDARD_ERROR, bytes.cast(), count) };
         }
         true
     }

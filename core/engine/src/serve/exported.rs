@@ -12,8 +12,8 @@ use super::emulated::Emulated;
 use crate::pipeline;
 use crate::study::Study;
 
-/// Version of the file's form.
-const FORM: &str = "1";
+/// Version of the form of the file.
+const VERSION: &str = "1";
 
 /// Writes the emulator of a finished run as a netCDF file, whose form is described in `docs/emulator_file.md`.
 ///
@@ -49,7 +49,7 @@ fn write(study: &Study, tables: &Tables, emulated: &Emulated<'_>, out: &Path) ->
         used.iter().map(|&i| say(&study.parameters[i])).collect()
     };
     let mut attributes = vec![
-        ("form", FORM.to_owned()),
+        ("file_version", VERSION.to_owned()),
         ("lacuna", env!("CARGO_PKG_VERSION").to_owned()),
         ("study", study.name.clone()),
         ("parameters", of(&|p| p.name.clone()).join(" ")),
