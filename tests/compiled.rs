@@ -22,10 +22,10 @@ const KINDS: [(&str, &str, &str); 8] = [
 ];
 
 /// Turn every warning into an error; what the program does with the code, it does without optimisation too.
-const STRICT: [&str; 5] = ["-Wall", "-Wextra", "-pedantic", "-Werror", "-O0"];
+pub const STRICT: [&str; 5] = ["-Wall", "-Wextra", "-pedantic", "-Werror", "-O0"];
 
 /// True if there is a compiler.
-fn has(compiler: &str) -> bool {
+pub fn has(compiler: &str) -> bool {
     let there = Command::new(compiler).arg("--version").output().is_ok();
     if !there {
         println!("skipped: there is no `{compiler}`");
@@ -34,7 +34,7 @@ fn has(compiler: &str) -> bool {
 }
 
 /// Standard output of a command with this exit code, and its standard error.
-fn told(command: &mut Command, code: i32) -> String {
+pub fn told(command: &mut Command, code: i32) -> String {
     let output = command.output().unwrap();
     let text = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();
     assert_eq!(output.status.code(), Some(code), "{command:?}: {text}");

@@ -30,6 +30,8 @@ mod fuzz;
 mod gap;
 mod gate;
 mod gradients;
+#[cfg(unix)]
+mod header;
 mod hierarchy;
 mod intervals;
 mod kill;

@@ -24,6 +24,11 @@ pub fn header() -> String {
         text,
         "#define LACUNA_RECORD_BEGIN \"lacuna-plugin-record:{MAJOR}.{MINOR}\\n\"\n\n{END}"
     );
+    for helpers in HELPERS {
+        text.push_str(helpers);
+        text.push('\n');
+    }
+    text.push_str(CLOSE);
     text
 }
 
@@ -32,12 +37,18 @@ const BEGIN: &str = r#"/* Plugins for Lacuna in C.
  * Written from the program's own declarations; docs/abi.md tells what holds at this boundary. In short: who allocates
  * frees; what a call is given belongs to the caller and is there until the call returns; results go into buffers of the
  * caller or through its answer; nothing unwinds; objects may be used from several threads at once.
+ *
+ * Behind the tables are functions that read JSON (`lacuna_json…`), write an answer (`lacuna_say…`, `lacuna_give`) and draw
+ * random numbers (`lacuna_random` and the following).
  */
 #ifndef LACUNA_PLUGIN_H
 #define LACUNA_PLUGIN_H
 
+#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -77,26 +88,13 @@ const END: &str = r#"/* A text from a string literal. */
         LACUNA_TEXT("lacuna_plugin.h"), (entries), LACUNA_TEXT(LACUNA_RECORD_BEGIN provides "end\n"), NULL \
     }
 
-/* Appends a text to an answer. */
-static inline void lacuna_say(const LacunaAnswer *answer, const char *bytes, size_t length)
-{
-    LacunaText text;
-    text.bytes = (const uint8_t *)bytes;
-    text.length = length;
-    answer->text(answer->context, text);
-}
+"#;
 
-/* Adds a matrix to an answer. */
-static inline void lacuna_give(const LacunaAnswer *answer, const double *values, size_t rows, size_t columns)
-{
-    LacunaNumbers numbers;
-    numbers.values = values;
-    numbers.rows = rows;
-    numbers.columns = columns;
-    answer->numbers(answer->context, numbers);
-}
+/// Functions in C for the authors of plugins, in this order: those of a file use those of the files before.
+const HELPERS: [&str; 3] =
+    [include_str!("header/json.h"), include_str!("header/say.h"), include_str!("header/random.h")];
 
-#ifdef __cplusplus
+const CLOSE: &str = r#"#ifdef __cplusplus
 }
 #endif
 
