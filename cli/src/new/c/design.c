@@ -9,28 +9,6 @@
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
-
-/* ---- texts ---- */
-
-static int32_t say(const LacunaAnswer *answer, int32_t status, const char *text)
-{
-    lacuna_say(answer, text, strlen(text));
-    return status;
-}
-
-/* 1 if the text has this piece. */
-static int has(LacunaText text, const char *piece)
-{
-    const size_t length = strlen(piece);
-    size_t at;
-    for (at = 0; at + length <= text.length; ++at) {
-        if (memcmp(text.bytes + at, piece, length) == 0) {
-            return 1;
-        }
-    }
-    return 0;
-}
 
 /* ---- the options ---- */
 
@@ -40,7 +18,7 @@ typedef struct {
 
 static int32_t schema(const LacunaAnswer *answer)
 {
-    return say(answer, LACUNA_OK,
+    return lacuna_say_text(answer,
         "{\"type\":\"object\",\"description\":\"Kronecker sequence of the generalised golden ratio, for few parameters: "
         "a longer design begins with the shorter one.\",\"additionalProperties\":false,\"properties\":{"
         "\"random_start\":{\"type\":\"boolean\",\"default\":true,\"description\":\"`true` starts the sequence at a "
@@ -49,17 +27,16 @@ static int32_t schema(const LacunaAnswer *answer)
 
 static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    const int given = has(options, "\"random_start\":"), no = has(options, "\"random_start\":false");
+    const int random_start = lacuna_json_true(lacuna_json(options, "random_start"), 1);
     Plugin *plugin;
-    if (given && !no && !has(options, "\"random_start\":true")) {
-        return say(answer, LACUNA_REJECTED,
-            "[{\"at\":\"random_start\",\"message\":\"wrong value for `random_start`\",\"expected\":\"true or false\"}]");
+    if (random_start < 0) {
+        return lacuna_wrong_option(answer, "random_start", "true or false");
     }
     plugin = malloc(sizeof *plugin);
     if (plugin == NULL) {
-        return say(answer, LACUNA_STOP, "there is no memory left");
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
-    plugin->random_start = !no;
+    plugin->random_start = random_start;
     *out = plugin;
     return LACUNA_OK;
 }
@@ -68,24 +45,16 @@ static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer
 static int32_t options(void *plugin, const LacunaAnswer *answer)
 {
     const Plugin *p = plugin;
-    return say(answer, LACUNA_OK, p->random_start ? "{\"random_start\":true}" : "{\"random_start\":false}");
+    return lacuna_say_text(answer, p->random_start ? "{\"random_start\":true}" : "{\"random_start\":false}");
 }
 
 /* ---- the points ---- */
 
-/* SplitMix64. All that is drawn follows from the key of the call, never from `rand` or a clock. */
-static double uniform(uint64_t *state)
-{
-    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return ((double)((z ^ (z >> 31)) >> 11) + 0.5) / 9007199254740992.0;
-}
-
 /* The points after the first `known` ones of the sequence. */
 static void place(const Plugin *plugin, size_t known, size_t count, size_t dimension, LacunaKey key, double *points)
 {
-    uint64_t random = key.words[0];
+    /* All that is drawn follows from the key of the call, never from `rand` or a clock. */
+    LacunaRandom random = lacuna_random(key);
     double g = 2.0;
     size_t i, j;
     /* Each pass reduces the error at least by a factor of three. */
@@ -93,7 +62,7 @@ static void place(const Plugin *plugin, size_t known, size_t count, size_t dimen
         g = pow(1.0 + g, 1.0 / ((double)dimension + 1.0));
     }
     for (j = 0; j < dimension; ++j) {
-        const double start = plugin->random_start ? uniform(&random) : 0.5;
+        const double start = plugin->random_start ? lacuna_uniform(&random) : 0.5;
         const double step = pow(g, -(double)(j + 1));
         for (i = 0; i < count; ++i) {
             const double x = start + (double)(known + i + 1) * step;

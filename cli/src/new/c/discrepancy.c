@@ -11,44 +11,10 @@
 #include "lacuna_plugin.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define TWO_PI 6.283185307179586
-
-/* ---- texts ---- */
-
-static int32_t say(const LacunaAnswer *answer, int32_t status, const char *text)
-{
-    lacuna_say(answer, text, strlen(text));
-    return status;
-}
-
-static int32_t no_memory(const LacunaAnswer *answer)
-{
-    return say(answer, LACUNA_STOP, "there is no memory left");
-}
-
-/* A copy that ends with a zero, to be freed; NULL if there is no memory left. */
-static char *copy_of(LacunaText text)
-{
-    char *copy = malloc(text.length + 1);
-    if (copy != NULL) {
-        if (text.length > 0) {
-            memcpy(copy, text.bytes, text.length);
-        }
-        copy[text.length] = '\0';
-    }
-    return copy;
-}
-
-/* The text after a piece of JSON, which the program writes without blanks; NULL if it does not have the piece. */
-static const char *after(const char *json, const char *piece)
-{
-    const char *at = json == NULL ? NULL : strstr(json, piece);
-    return at == NULL ? NULL : at + strlen(piece);
-}
 
 /* ---- the options ---- */
 
@@ -59,7 +25,7 @@ typedef struct {
 
 static int32_t schema(const LacunaAnswer *answer)
 {
-    return say(answer, LACUNA_OK,
+    return lacuna_say_text(answer,
         "{\"type\":\"object\",\"description\":\"Independent normal noise with one standard deviation for all outputs. The "
         "errors that all replicates share are added without their correlation between outputs.\","
         "\"additionalProperties\":false,\"properties\":{"
@@ -69,21 +35,17 @@ static int32_t schema(const LacunaAnswer *answer)
 
 static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    char *text = copy_of(options), *end = NULL;
-    const char *at = after(text, "\"scale\":");
-    Plugin *plugin = malloc(sizeof *plugin);
-    if (text == NULL || plugin == NULL) {
-        free(text);
-        free(plugin);
-        return no_memory(answer);
+    const LacunaText given = lacuna_json(options, "scale");
+    const double scale = lacuna_json_number(given, 0.0);
+    Plugin *plugin;
+    if (given.length > 0 && (!(scale > 0.0) || isinf(scale))) {
+        return lacuna_wrong_option(answer, "scale", "a number above 0");
     }
-    plugin->scale = at == NULL ? 0.0 : strtod(at, &end);
-    free(text);
-    if (at != NULL && (end == at || !(plugin->scale > 0.0) || isinf(plugin->scale))) {
-        free(plugin);
-        return say(answer, LACUNA_REJECTED,
-            "[{\"at\":\"scale\",\"message\":\"wrong value for `scale`\",\"expected\":\"a number above 0\"}]");
+    plugin = malloc(sizeof *plugin);
+    if (plugin == NULL) {
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
+    plugin->scale = scale;
     *out = plugin;
     return LACUNA_OK;
 }
@@ -115,12 +77,14 @@ static void end_likelihood(void *object)
 static int32_t hyperparameters(void *object, const LacunaAnswer *answer)
 {
     const Likelihood *l = object;
-    char text[320];
+    lacuna_say_text(answer, "[{\"name\":\"deviation\",\"symbol\":\"s\",\"unit\":");
+    lacuna_say_string(answer, l->unit);
+    lacuna_say_text(answer, ",\"prior\":{\"half_normal\":");
+    lacuna_say_number(answer, l->scale);
     /* It starts at the median of its prior. */
-    snprintf(text, sizeof text,
-        "[{\"name\":\"deviation\",\"symbol\":\"s\",\"unit\":\"%s\",\"prior\":{\"half_normal\":%.17g},\"log\":true,"
-        "\"start\":%.17g}]", l->unit, l->scale, 0.6744897501960817 * l->scale);
-    return say(answer, LACUNA_OK, text);
+    lacuna_say_text(answer, "},\"log\":true,\"start\":");
+    lacuna_say_number(answer, 0.6744897501960817 * l->scale);
+    return lacuna_say_text(answer, "}]");
 }
 
 /* The log-likelihood at one response and, where they are asked for, its derivatives; minus infinity for what is no
@@ -188,7 +152,7 @@ static int32_t predictive(void *object, LacunaNumbers response, LacunaNumbers hy
     size_t i;
     (void)response;
     if (parts == NULL) {
-        return no_memory(answer);
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
     for (i = 0; i < l->outputs; ++i) {
         parts[i] = hyper.values[0] * hyper.values[0];
@@ -196,36 +160,21 @@ static int32_t predictive(void *object, LacunaNumbers response, LacunaNumbers hy
     }
     lacuna_give(answer, parts, 2, l->outputs);
     free(parts);
-    return say(answer, LACUNA_OK, "[\"discrepancy\",\"common\"]");
-}
-
-/* SplitMix64. All that is drawn follows from the key of the call, never from `rand` or a clock. */
-static double uniform(uint64_t *state)
-{
-    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return ((double)((z ^ (z >> 31)) >> 11) + 0.5) / 9007199254740992.0;
-}
-
-/* By the method of Box and Muller. */
-static double normal(uint64_t *state)
-{
-    const double radius = sqrt(-2.0 * log(uniform(state)));
-    return radius * cos(TWO_PI * uniform(state));
+    return lacuna_say_text(answer, "[\"discrepancy\",\"common\"]");
 }
 
 static int32_t simulate(void *object, LacunaNumbers response, LacunaNumbers hyper, LacunaKey key, double *values,
                         const LacunaAnswer *answer)
 {
     const Likelihood *l = object;
-    uint64_t random = key.words[0];
+    /* All that is drawn follows from the key of the call, never from `rand` or a clock. */
+    LacunaRandom random = lacuna_random(key);
     size_t i, r;
     (void)answer;
     for (i = 0; i < l->outputs; ++i) {
-        const double centre = response.values[i] + sqrt(l->each[i].shared) * normal(&random);
+        const double centre = response.values[i] + sqrt(l->each[i].shared) * lacuna_normal(&random);
         for (r = 0; r < l->replicates; ++r) {
-            values[r * l->outputs + i] = centre + hyper.values[0] * normal(&random);
+            values[r * l->outputs + i] = centre + hyper.values[0] * lacuna_normal(&random);
         }
     }
     return LACUNA_OK;
@@ -300,25 +249,13 @@ static const char *add_shared(Likelihood *l, const LacunaKnown *known)
     return NULL;
 }
 
-/* The unit of the response, the first one of the layout. */
-static void read_unit(Likelihood *l, LacunaText about)
-{
-    char *text = copy_of(about);
-    const char *unit = after(text, "\"unit\":\"");
-    const size_t length = unit == NULL ? 0 : strcspn(unit, "\"");
-    snprintf(l->unit, sizeof l->unit, "%.*s", (int)(length < sizeof l->unit ? length : 0), unit == NULL ? "" : unit);
-    if (l->unit[0] == '\0') {
-        strcpy(l->unit, "1");
-    }
-    free(text);
-}
-
 static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikelihood *out, const LacunaAnswer *answer)
 {
     Likelihood *l = calloc(1, sizeof *l);
     const char *wrong;
+    LacunaText unit;
     if (l == NULL) {
-        return no_memory(answer);
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
     l->outputs = known->values.columns;
     l->replicates = known->values.rows;
@@ -326,11 +263,14 @@ static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikeliho
     l->each = calloc(l->outputs + 1, sizeof *l->each);
     wrong = l->each == NULL ? "there is no memory left" : summarise(l, known);
     wrong = wrong == NULL ? add_shared(l, known) : wrong;
+    unit = lacuna_json(known->about, "layout/unit");
+    if (wrong == NULL && lacuna_json_string(unit, l->unit, sizeof l->unit) >= sizeof l->unit) {
+        wrong = "the response has no unit of fewer than 64 bytes";
+    }
     if (wrong != NULL) {
         end_likelihood(l);
-        return say(answer, LACUNA_STOP, wrong);
+        return lacuna_fail(answer, LACUNA_STOP, wrong);
     }
-    read_unit(l, known->about);
     out->size = sizeof *out;
     out->likelihood = l;
     out->functions = &likelihood_functions;

@@ -8,30 +8,7 @@
 #include "lacuna_plugin.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-
-/* ---- texts ---- */
-
-static int32_t say(const LacunaAnswer *answer, int32_t status, const char *text)
-{
-    lacuna_say(answer, text, strlen(text));
-    return status;
-}
-
-/* A copy that ends with a zero, to be freed; NULL if there is no memory left. */
-static char *copy_of(LacunaText text)
-{
-    char *copy = malloc(text.length + 1);
-    if (copy != NULL) {
-        if (text.length > 0) {
-            memcpy(copy, text.bytes, text.length);
-        }
-        copy[text.length] = '\0';
-    }
-    return copy;
-}
 
 /* ---- the options ---- */
 
@@ -41,7 +18,7 @@ typedef struct {
 
 static int32_t schema(const LacunaAnswer *answer)
 {
-    return say(answer, LACUNA_OK,
+    return lacuna_say_text(answer,
         "{\"type\":\"object\",\"description\":\"A slope of the gain: all values of a curve are multiplied by a factor that "
         "is one in its middle and changes linearly along the last axis.\",\"additionalProperties\":false,\"properties\":{"
         "\"deviation\":{\"type\":\"number\",\"exclusiveMinimum\":0,\"default\":0.1,\"description\":\"The standard "
@@ -50,27 +27,16 @@ static int32_t schema(const LacunaAnswer *answer)
 
 static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    char *text = copy_of(options), *end = NULL;
-    const char *at = text == NULL ? NULL : strstr(text, "\"deviation\":");
-    Plugin *plugin = malloc(sizeof *plugin);
-    int sound = 1;
-    if (text == NULL || plugin == NULL) {
-        free(text);
-        free(plugin);
-        return say(answer, LACUNA_STOP, "there is no memory left");
+    const double deviation = lacuna_json_number(lacuna_json(options, "deviation"), 0.1);
+    Plugin *plugin;
+    if (!(deviation > 0.0) || isinf(deviation)) {
+        return lacuna_wrong_option(answer, "deviation", "a number above 0");
     }
-    plugin->deviation = 0.1;
-    if (at != NULL) {
-        at += strlen("\"deviation\":");
-        plugin->deviation = strtod(at, &end);
-        sound = end != at && plugin->deviation > 0.0 && !isinf(plugin->deviation);
+    plugin = malloc(sizeof *plugin);
+    if (plugin == NULL) {
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
-    free(text);
-    if (!sound) {
-        free(plugin);
-        return say(answer, LACUNA_REJECTED,
-            "[{\"at\":\"deviation\",\"message\":\"wrong value for `deviation`\",\"expected\":\"a number above 0\"}]");
-    }
+    plugin->deviation = deviation;
     *out = plugin;
     return LACUNA_OK;
 }
@@ -78,9 +44,9 @@ static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer
 /* All options with their defaults, which the record of a run keeps. */
 static int32_t options(void *plugin, const LacunaAnswer *answer)
 {
-    char text[64];
-    snprintf(text, sizeof text, "{\"deviation\":%.17g}", ((const Plugin *)plugin)->deviation);
-    return say(answer, LACUNA_OK, text);
+    lacuna_say_text(answer, "{\"deviation\":");
+    lacuna_say_number(answer, ((const Plugin *)plugin)->deviation);
+    return lacuna_say_text(answer, "}");
 }
 
 /* ---- the curve ---- */
@@ -88,33 +54,23 @@ static int32_t options(void *plugin, const LacunaAnswer *answer)
 /* The place u of each value of a curve, to be freed, and their number; all zero where the last axis is no grid. */
 static double *places(LacunaText layout, size_t *count)
 {
-    char *text = copy_of(layout);
-    const char *at = text, *next = text;
-    double *u, half;
+    LacunaEach axis = lacuna_json_each(lacuna_json(layout, "axes"));
+    LacunaText grid = {NULL, 0};
+    double *u, first, half;
     size_t i;
-    while (next != NULL && (next = strstr(next, "\"values\":[")) != NULL) {
-        next += strlen("\"values\":[");
-        at = next;
+    while (lacuna_json_next(&axis)) {
+        grid = lacuna_json(axis.value, "coordinates/grid/values");
     }
-    if (text == NULL || at == text || strstr(at, "\"labels\":[") != NULL) {
-        free(text);
+    u = lacuna_json_numbers(grid, count);
+    if (u == NULL || *count == 0) {
+        free(u);
         *count = 1;
         return calloc(1, sizeof *u);
     }
-    *count = 1;
-    for (i = 0; at[i] != '\0' && at[i] != ']'; ++i) {
-        *count += at[i] == ',';
-    }
-    u = malloc(*count * sizeof *u);
-    for (i = 0; u != NULL && i < *count; ++i) {
-        char *end;
-        u[i] = strtod(at, &end);
-        at = end + 1;
-    }
-    free(text);
-    half = u == NULL ? 0.0 : 0.5 * (u[*count - 1] - u[0]);
-    for (i = *count; u != NULL && i-- > 0;) {
-        u[i] = half > 0.0 ? (u[i] - u[0]) / half - 1.0 : 0.0;
+    first = u[0];
+    half = 0.5 * (u[*count - 1] - first);
+    for (i = 0; i < *count; ++i) {
+        u[i] = half > 0.0 ? (u[i] - first) / half - 1.0 : 0.0;
     }
     return u;
 }
@@ -126,7 +82,7 @@ static int32_t times(LacunaText layout, LacunaNumbers rows, double constant, con
     size_t i, j, count;
     double *u = places(layout, &count);
     if (u == NULL) {
-        return say(answer, LACUNA_STOP, "there is no memory left");
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
     for (i = 0; i < rows.rows; ++i) {
         for (j = 0; j < rows.columns; ++j) {
@@ -143,7 +99,7 @@ static int32_t times(LacunaText layout, LacunaNumbers rows, double constant, con
 static int32_t describe(void *plugin, const LacunaAnswer *answer)
 {
     (void)plugin;
-    return say(answer, LACUNA_OK,
+    return lacuna_say_text(answer,
         "{\"title\":\"a slope of the gain: a sensitivity that changes along the curve\",\"formula\":\"(1 + slope u) y\","
         "\"source\":\"standard: sensitivity drift of a measuring chain\",\"reach\":\"any\"}");
 }
@@ -151,12 +107,12 @@ static int32_t describe(void *plugin, const LacunaAnswer *answer)
 static int32_t parameters(void *plugin, LacunaText layout, const LacunaAnswer *answer)
 {
     const double deviation = ((const Plugin *)plugin)->deviation;
-    char text[256];
     (void)layout;
-    snprintf(text, sizeof text,
-        "[{\"name\":\"slope\",\"symbol\":\"g1\",\"unit\":\"1\",\"prior\":{\"normal\":[0,%.17g]},\"log\":false,"
-        "\"start\":%.17g}]", deviation, deviation);
-    return say(answer, LACUNA_OK, text);
+    lacuna_say_text(answer, "[{\"name\":\"slope\",\"symbol\":\"g1\",\"unit\":\"1\",\"prior\":{\"normal\":[0,");
+    lacuna_say_number(answer, deviation);
+    lacuna_say_text(answer, "]},\"log\":false,\"start\":");
+    lacuna_say_number(answer, deviation);
+    return lacuna_say_text(answer, "}]");
 }
 
 static int32_t absent(void *plugin, LacunaText layout, const LacunaAnswer *answer)
@@ -208,7 +164,7 @@ static int32_t proposals(void *plugin, LacunaText situation, const LacunaAnswer 
 {
     (void)plugin;
     (void)situation;
-    return say(answer, LACUNA_OK, "[{}]");
+    return lacuna_say_text(answer, "[{}]");
 }
 
 /* ---- the library ---- */

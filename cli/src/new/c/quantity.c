@@ -6,33 +6,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
-
-/* ---- texts ---- */
-
-static int32_t say(const LacunaAnswer *answer, int32_t status, const char *text)
-{
-    lacuna_say(answer, text, strlen(text));
-    return status;
-}
-
-/* The place after a piece of a text; the length of the text if it does not have the piece. */
-static size_t after(LacunaText text, const char *piece)
-{
-    const size_t length = strlen(piece);
-    size_t at;
-    for (at = 0; at + length <= text.length; ++at) {
-        if (memcmp(text.bytes + at, piece, length) == 0) {
-            return at + length;
-        }
-    }
-    return text.length;
-}
-
-static int has(LacunaText text, const char *piece)
-{
-    return after(text, piece) < text.length;
-}
 
 /* ---- the options ---- */
 
@@ -42,7 +15,7 @@ typedef struct {
 
 static int32_t schema(const LacunaAnswer *answer)
 {
-    return say(answer, LACUNA_OK,
+    return lacuna_say_text(answer,
         "{\"type\":\"object\",\"description\":\"Crest factor: the largest magnitude of a curve divided by its root mean "
         "square, or by that about its mean.\",\"additionalProperties\":false,\"properties\":{"
         "\"about_mean\":{\"type\":\"boolean\",\"default\":false,\"description\":\"`true` takes the mean of the values off "
@@ -51,17 +24,16 @@ static int32_t schema(const LacunaAnswer *answer)
 
 static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    const int given = has(options, "\"about_mean\":"), yes = has(options, "\"about_mean\":true");
+    const int about_mean = lacuna_json_true(lacuna_json(options, "about_mean"), 0);
     Plugin *plugin;
-    if (given && !yes && !has(options, "\"about_mean\":false")) {
-        return say(answer, LACUNA_REJECTED,
-            "[{\"at\":\"about_mean\",\"message\":\"wrong value for `about_mean`\",\"expected\":\"true or false\"}]");
+    if (about_mean < 0) {
+        return lacuna_wrong_option(answer, "about_mean", "true or false");
     }
     plugin = malloc(sizeof *plugin);
     if (plugin == NULL) {
-        return say(answer, LACUNA_STOP, "there is no memory left");
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
-    plugin->about_mean = yes;
+    plugin->about_mean = about_mean;
     *out = plugin;
     return LACUNA_OK;
 }
@@ -70,7 +42,7 @@ static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer
 static int32_t options(void *plugin, const LacunaAnswer *answer)
 {
     const Plugin *p = plugin;
-    return say(answer, LACUNA_OK, p->about_mean ? "{\"about_mean\":true}" : "{\"about_mean\":false}");
+    return lacuna_say_text(answer, p->about_mean ? "{\"about_mean\":true}" : "{\"about_mean\":false}");
 }
 
 /* ---- the quantity ---- */
@@ -78,7 +50,7 @@ static int32_t options(void *plugin, const LacunaAnswer *answer)
 static int32_t unit(void *functional, const LacunaAnswer *answer)
 {
     (void)functional;
-    return say(answer, LACUNA_OK, "1");
+    return lacuna_say_text(answer, "1");
 }
 
 static double crest_factor(const double *y, size_t count, int about_mean)
@@ -118,29 +90,17 @@ static int32_t of_curve(void *plugin, uint8_t *curve, const LacunaAnswer *answer
     return LACUNA_OK;
 }
 
-/* 1 if the curve has at least two points: a comma stands between the numbers of its grid. */
-static int has_points(LacunaText arguments)
-{
-    size_t at = after(arguments, "\"grid\":[");
-    while (at < arguments.length && arguments.bytes[at] != ']') {
-        if (arguments.bytes[at++] == ',') {
-            return 1;
-        }
-    }
-    return 0;
-}
-
 static int32_t bind(void *plugin, LacunaText arguments, LacunaFunctional *out, const LacunaAnswer *answer)
 {
     Plugin *copy;
-    if (!has_points(arguments)) {
-        return say(answer, LACUNA_REJECTED,
-            "[{\"at\":\"use\",\"message\":\"a curve of one point has no crest factor\",\"help\":[\"widen the `window`\"]}]");
+    if (lacuna_json_count(lacuna_json(arguments, "curve/grid")) < 2) {
+        return lacuna_fail(answer, LACUNA_REJECTED,
+        "[{\"at\":\"use\",\"message\":\"a curve of one point has no crest factor\",\"help\":[\"widen the `window`\"]}]");
     }
     /* The functional may outlive the plugin, and keeps what it needs of it. */
     copy = malloc(sizeof *copy);
     if (copy == NULL) {
-        return say(answer, LACUNA_STOP, "there is no memory left");
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
     *copy = *(const Plugin *)plugin;
     out->size = sizeof *out;

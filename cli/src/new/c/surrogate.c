@@ -9,32 +9,10 @@
 #include "lacuna_plugin.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define RIDGE 1e-6
-
-/* ---- texts ---- */
-
-static int32_t say(const LacunaAnswer *answer, int32_t status, const char *text)
-{
-    lacuna_say(answer, text, strlen(text));
-    return status;
-}
-
-/* A copy that ends with a zero, to be freed; NULL if there is no memory left. */
-static char *copy_of(LacunaText text)
-{
-    char *copy = malloc(text.length + 1);
-    if (copy != NULL) {
-        if (text.length > 0) {
-            memcpy(copy, text.bytes, text.length);
-        }
-        copy[text.length] = '\0';
-    }
-    return copy;
-}
 
 /* ---- the options ---- */
 
@@ -44,7 +22,7 @@ typedef struct {
 
 static int32_t schema(const LacunaAnswer *answer)
 {
-    return say(answer, LACUNA_OK,
+    return lacuna_say_text(answer,
         "{\"type\":\"object\",\"description\":\"Gaussian functions around the runs, for smooth responses of few parameters.\","
         "\"additionalProperties\":false,\"properties\":{"
         "\"length\":{\"type\":\"number\",\"exclusiveMinimum\":0,\"default\":1.0,\"description\":\"Standard deviation of the "
@@ -53,22 +31,16 @@ static int32_t schema(const LacunaAnswer *answer)
 
 static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    char *text = copy_of(options), *end = NULL;
-    const char *at = text == NULL ? NULL : strstr(text, "\"length\":");
-    Plugin *plugin = malloc(sizeof *plugin);
-    if (text == NULL || plugin == NULL) {
-        free(text);
-        free(plugin);
-        return say(answer, LACUNA_STOP, "there is no memory left");
+    const double length = lacuna_json_number(lacuna_json(options, "length"), 1.0);
+    Plugin *plugin;
+    if (!(length > 0.0) || isinf(length)) {
+        return lacuna_wrong_option(answer, "length", "a number above 0");
     }
-    at = at == NULL ? NULL : at + strlen("\"length\":");
-    plugin->length = at == NULL ? 1.0 : strtod(at, &end);
-    free(text);
-    if ((at != NULL && end == at) || !(plugin->length > 0.0) || isinf(plugin->length)) {
-        free(plugin);
-        return say(answer, LACUNA_REJECTED,
-            "[{\"at\":\"length\",\"message\":\"wrong value for `length`\",\"expected\":\"a number above 0\"}]");
+    plugin = malloc(sizeof *plugin);
+    if (plugin == NULL) {
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
+    plugin->length = length;
     *out = plugin;
     return LACUNA_OK;
 }
@@ -227,11 +199,11 @@ static int32_t load(void *plugin, LacunaText bytes, LacunaEmulator *out, const L
     }
     if (!is_count(counts[0]) || !is_count(counts[1]) || !is_count(counts[2]) ||
         size_of(counts[0], counts[1], counts[2]) * sizeof *counts != (double)bytes.length) {
-        return say(answer, LACUNA_STOP, "these bytes are no emulator");
+        return lacuna_fail(answer, LACUNA_STOP, "these bytes are no emulator");
     }
     e = begin_emulator(counts[0], counts[1], counts[2]);
     if (e == NULL) {
-        return say(answer, LACUNA_STOP, "there is no memory left");
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
     memcpy(e->numbers, bytes.bytes, bytes.length);
     return hand_over(e, out);
@@ -359,20 +331,20 @@ static int32_t fit(void *plugin, const LacunaTraining *training, LacunaKey key, 
     Emulator *e;
     (void)key;
     if (points.rows < 2 || points.rows != responses.rows) {
-        return say(answer, LACUNA_STOP, "expected at least two runs, each with a response");
+        return lacuna_fail(answer, LACUNA_STOP, "expected at least two runs, each with a response");
     }
     if (!all_finite(points) || !all_finite(responses)) {
-        return say(answer, LACUNA_STOP, "a run has a value that is not finite");
+        return lacuna_fail(answer, LACUNA_STOP, "a run has a value that is not finite");
     }
     e = begin_emulator((double)points.columns, (double)responses.columns, (double)points.rows);
     if (e == NULL) {
-        return say(answer, LACUNA_STOP, "there is no memory left");
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
     e->numbers[3] = ((const Plugin *)plugin)->length;
     reason = fit_to(e, training);
     if (reason != NULL) {
         end_emulator(e);
-        return say(answer, LACUNA_STOP, reason);
+        return lacuna_fail(answer, LACUNA_STOP, reason);
     }
     progress->functions->add(progress->progress, responses.columns);
     return hand_over(e, out);
