@@ -183,7 +183,7 @@ fn an_exception_in_a_skeleton_in_cpp_is_told() {
     let line = written(path, "design", "cpp");
     let file = path.join("trial_design.cpp");
     let text = fs::read_to_string(&file).unwrap();
-    let body = "    std::mt19937_64 random(key.words[0]);\n";
+    let body = "    LacunaRandom random = lacuna_random(key);\n";
     // The contract asks for points of one, three and four coordinates.
     let throws = "    if (dimension == 1) throw std::runtime_error(\"the cube is full\");\n    \
                   if (dimension == 3) throw Rejected(\"another key would do\");\n    \

@@ -8,9 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <random>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -45,18 +43,6 @@ int32_t guard(const LacunaAnswer *answer, Act act) noexcept
     }
 }
 
-std::string string_of(LacunaText text)
-{
-    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
-}
-
-/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
-size_t after(const std::string &json, const std::string &piece, size_t from = 0)
-{
-    const size_t at = from == std::string::npos ? from : json.find(piece, from);
-    return at == std::string::npos ? at : at + piece.size();
-}
-
 Rejected wrong_option(const std::string &key, const std::string &expected)
 {
     return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
@@ -68,15 +54,13 @@ Rejected wrong_option(const std::string &key, const std::string &expected)
 struct Plugin {
     bool random_start = true;
 
-    explicit Plugin(const std::string &options)
+    explicit Plugin(LacunaText options)
     {
-        const size_t at = after(options, R"("random_start":)");
-        if (at != std::string::npos) {
-            random_start = options.compare(at, 4, "true") == 0;
-            if (!random_start && options.compare(at, 5, "false") != 0) {
-                throw wrong_option("random_start", "true or false");
-            }
+        const int given = lacuna_json_true(lacuna_json(options, "random_start"), 1);
+        if (given < 0) {
+            throw wrong_option("random_start", "true or false");
         }
+        random_start = given == 1;
     }
 };
 
@@ -98,7 +82,7 @@ int32_t schema(const LacunaAnswer *answer)
 
 int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+    return guard(answer, [&] { *out = new Plugin(options); });
 }
 
 void destroy(void *plugin)
@@ -118,15 +102,14 @@ int32_t options(void *plugin, const LacunaAnswer *answer)
 /* The points behind the first `known` ones of the sequence. All that is drawn follows from the key alone. */
 void place(const Plugin &plugin, size_t known, size_t count, size_t dimension, LacunaKey key, double *points)
 {
-    std::mt19937_64 random(key.words[0]);
-    std::uniform_real_distribution<double> uniform;
+    LacunaRandom random = lacuna_random(key);
     double g = 2.0;
     /* Each pass reduces the error at least by a factor of three. */
     for (int pass = 0; pass < 60; ++pass) {
         g = std::pow(1.0 + g, 1.0 / (static_cast<double>(dimension) + 1.0));
     }
     for (size_t j = 0; j < dimension; ++j) {
-        const double start = plugin.random_start ? uniform(random) : 0.5;
+        const double start = plugin.random_start ? lacuna_uniform(&random) : 0.5;
         const double step = std::pow(g, -static_cast<double>(j + 1));
         for (size_t i = 0; i < count; ++i) {
             const double x = start + static_cast<double>(known + i + 1) * step;

@@ -12,11 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <limits>
-#include <random>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -57,25 +53,10 @@ std::string string_of(LacunaText text)
     return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
 }
 
-/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
-size_t after(const std::string &json, const std::string &piece, size_t from = 0)
-{
-    const size_t at = from == std::string::npos ? from : json.find(piece, from);
-    return at == std::string::npos ? at : at + piece.size();
-}
-
 Rejected wrong_option(const std::string &key, const std::string &expected)
 {
     return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
                     "\"}]");
-}
-
-/* A number with all its digits. */
-std::string digits(double x)
-{
-    char text[32];
-    std::snprintf(text, sizeof text, "%.17g", x);
-    return text;
 }
 
 /* ---- the options ---- */
@@ -84,15 +65,12 @@ struct Plugin {
     /* The scale of the prior; 0 if it follows from the data. */
     double scale = 0.0;
 
-    explicit Plugin(const std::string &options)
+    explicit Plugin(LacunaText options)
     {
-        const size_t at = after(options, R"("scale":)");
-        if (at != std::string::npos) {
-            /* What is no number reads as zero. */
-            scale = std::strtod(options.c_str() + at, nullptr);
-            if (!(scale > 0.0 && std::isfinite(scale))) {
-                throw wrong_option("scale", "a number above 0");
-            }
+        const LacunaText given = lacuna_json(options, "scale");
+        scale = lacuna_json_number(given, scale);
+        if (given.length > 0 && !(scale > 0.0 && std::isfinite(scale))) {
+            throw wrong_option("scale", "a number above 0");
         }
     }
 };
@@ -116,7 +94,7 @@ int32_t schema(const LacunaAnswer *answer)
 
 int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+    return guard(answer, [&] { *out = new Plugin(options); });
 }
 
 void destroy(void *plugin)
@@ -141,26 +119,24 @@ struct Judged {
 class Likelihood {
 public:
     Likelihood(const LacunaKnown &known, double scale)
-        : scale_(scale), replicates_(known.values.rows), each_(known.values.columns), unit_("1")
+        : scale_(scale), replicates_(known.values.rows), each_(known.values.columns)
     {
         summarise(known);
         add_shared(known);
-        const std::string json = string_of(known.about);
-        /* The first unit of the layout is that of the response. */
-        const size_t unit = after(json, R"("unit":")");
-        if (unit != std::string::npos) {
-            unit_ = json.substr(unit, json.find('"', unit) - unit);
-        }
+        unit_ = string_of(lacuna_json(known.about, "layout/unit"));
     }
 
     const std::vector<Output> &outputs() const { return each_; }
     size_t replicates() const { return replicates_; }
 
-    std::string unknowns() const
+    void say_unknowns(const LacunaAnswer *answer) const
     {
+        say(answer, R"([{"name":"deviation","symbol":"s","unit":)" + unit_ + R"(,"prior":{"half_normal":)");
+        lacuna_say_number(answer, scale_);
         /* It starts at the median of its prior. */
-        return R"([{"name":"deviation","symbol":"s","unit":")" + unit_ + R"(","prior":{"half_normal":)" + digits(scale_) +
-               R"(},"log":true,"start":)" + digits(0.6744897501960817 * scale_) + "}]";
+        say(answer, R"(},"log":true,"start":)");
+        lacuna_say_number(answer, 0.6744897501960817 * scale_);
+        say(answer, "}]");
     }
 
     Judged judge(const double *response, double s) const
@@ -238,7 +214,7 @@ private:
     double scale_, scatter_ = 0.0;
     size_t replicates_;
     std::vector<Output> each_;
-    std::string unit_;
+    std::string unit_; /* JSON */
 };
 
 const Likelihood &of(void *object)
@@ -253,7 +229,7 @@ void end_likelihood(void *object)
 
 int32_t hyperparameters(void *object, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] { say(answer, of(object).unknowns()); });
+    return guard(answer, [&] { of(object).say_unknowns(answer); });
 }
 
 int32_t log_likelihood(void *object, LacunaNumbers responses, LacunaNumbers hyper, double *values,
@@ -297,12 +273,11 @@ int32_t simulate(void *object, LacunaNumbers response, LacunaNumbers hyper, Lacu
 {
     return guard(answer, [&] {
         const auto &outputs = of(object).outputs();
-        std::mt19937_64 random(key.words[0]);
-        std::normal_distribution<double> normal;
+        LacunaRandom random = lacuna_random(key);
         for (size_t i = 0; i < outputs.size(); ++i) {
-            const double centre = response.values[i] + std::sqrt(outputs[i].shared) * normal(random);
+            const double centre = response.values[i] + std::sqrt(outputs[i].shared) * lacuna_normal(&random);
             for (size_t r = 0; r < of(object).replicates(); ++r) {
-                values[r * outputs.size() + i] = centre + hyper.values[0] * normal(random);
+                values[r * outputs.size() + i] = centre + hyper.values[0] * lacuna_normal(&random);
             }
         }
     });

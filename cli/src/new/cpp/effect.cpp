@@ -8,9 +8,6 @@
 #include "lacuna_plugin.h"
 
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -46,30 +43,10 @@ int32_t guard(const LacunaAnswer *answer, Act act) noexcept
     }
 }
 
-std::string string_of(LacunaText text)
-{
-    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
-}
-
-/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
-size_t after(const std::string &json, const std::string &piece, size_t from = 0)
-{
-    const size_t at = from == std::string::npos ? from : json.find(piece, from);
-    return at == std::string::npos ? at : at + piece.size();
-}
-
 Rejected wrong_option(const std::string &key, const std::string &expected)
 {
     return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
                     "\"}]");
-}
-
-/* A number with all its digits. */
-std::string digits(double x)
-{
-    char text[32];
-    std::snprintf(text, sizeof text, "%.17g", x);
-    return text;
 }
 
 /* ---- the options ---- */
@@ -77,13 +54,9 @@ std::string digits(double x)
 struct Plugin {
     double deviation = 0.1;
 
-    explicit Plugin(const std::string &options)
+    explicit Plugin(LacunaText options)
     {
-        const size_t at = after(options, R"("deviation":)");
-        if (at != std::string::npos) {
-            /* What is no number reads as zero. */
-            deviation = std::strtod(options.c_str() + at, nullptr);
-        }
+        deviation = lacuna_json_number(lacuna_json(options, "deviation"), deviation);
         if (!(deviation > 0.0 && std::isfinite(deviation))) {
             throw wrong_option("deviation", "a number above 0");
         }
@@ -109,7 +82,7 @@ int32_t schema(const LacunaAnswer *answer)
 
 int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+    return guard(answer, [&] { *out = new Plugin(options); });
 }
 
 void destroy(void *plugin)
@@ -120,9 +93,9 @@ void destroy(void *plugin)
 /* All options with their defaults, which the record of a run keeps. */
 int32_t options(void *plugin, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] {
-        say(answer, R"({"deviation":)" + digits(static_cast<const Plugin *>(plugin)->deviation) + "}");
-    });
+    lacuna_say_text(answer, R"({"deviation":)");
+    lacuna_say_number(answer, static_cast<const Plugin *>(plugin)->deviation);
+    return lacuna_say_text(answer, "}");
 }
 
 /* ---- the curve ---- */
@@ -130,16 +103,16 @@ int32_t options(void *plugin, const LacunaAnswer *answer)
 /* The place u of each value of a curve; zero where the last axis is no grid. */
 std::vector<double> places(LacunaText layout)
 {
-    const std::string json = string_of(layout), piece = R"("values":[)";
-    const size_t last = json.rfind(piece);
-    if (last == std::string::npos || json.find(R"("labels":[)", last) != std::string::npos) {
-        return {0.0};
+    LacunaText grid{};
+    for (LacunaEach axis = lacuna_json_each(lacuna_json(layout, "axes")); lacuna_json_next(&axis) != 0;) {
+        grid = lacuna_json(axis.value, "coordinates/grid/values");
     }
     std::vector<double> u;
-    for (const char *at = json.c_str() + last + piece.size(); *at != ']' && *at != '\0';) {
-        char *end = nullptr;
-        u.push_back(std::strtod(at, &end));
-        at = *end == ',' ? end + 1 : end;
+    for (LacunaEach each = lacuna_json_each(grid); lacuna_json_next(&each) != 0;) {
+        u.push_back(lacuna_json_number(each.value, 0.0));
+    }
+    if (u.empty()) {
+        return {0.0};
     }
     const double first = u.front(), half = 0.5 * (u.back() - first);
     for (double &x : u) {
@@ -170,11 +143,12 @@ int32_t describe(void *, const LacunaAnswer *answer)
 
 int32_t parameters(void *plugin, LacunaText, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] {
-        const std::string deviation = digits(static_cast<const Plugin *>(plugin)->deviation);
-        say(answer, R"([{"name":"slope","symbol":"g1","unit":"1","prior":{"normal":[0,)" + deviation +
-                        R"(]},"log":false,"start":)" + deviation + "}]");
-    });
+    const double deviation = static_cast<const Plugin *>(plugin)->deviation;
+    lacuna_say_text(answer, R"([{"name":"slope","symbol":"g1","unit":"1","prior":{"normal":[0,)");
+    lacuna_say_number(answer, deviation);
+    lacuna_say_text(answer, R"(]},"log":false,"start":)");
+    lacuna_say_number(answer, deviation);
+    return lacuna_say_text(answer, "}]");
 }
 
 int32_t absent(void *, LacunaText, const LacunaAnswer *answer)

@@ -6,9 +6,6 @@
 #include "lacuna_plugin.h"
 
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -44,30 +41,10 @@ int32_t guard(const LacunaAnswer *answer, Act act) noexcept
     }
 }
 
-std::string string_of(LacunaText text)
-{
-    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
-}
-
-/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
-size_t after(const std::string &json, const std::string &piece, size_t from = 0)
-{
-    const size_t at = from == std::string::npos ? from : json.find(piece, from);
-    return at == std::string::npos ? at : at + piece.size();
-}
-
 Rejected wrong_option(const std::string &key, const std::string &expected)
 {
     return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
                     "\"}]");
-}
-
-/* A number with all its digits. */
-std::string digits(double x)
-{
-    char text[32];
-    std::snprintf(text, sizeof text, "%.17g", x);
-    return text;
 }
 
 /* ---- the options ---- */
@@ -75,15 +52,11 @@ std::string digits(double x)
 struct Plugin {
     double background = 0.0;
 
-    explicit Plugin(const std::string &options)
+    explicit Plugin(LacunaText options)
     {
-        const size_t at = after(options, R"("background":)");
-        if (at != std::string::npos) {
-            char *end = nullptr;
-            background = std::strtod(options.c_str() + at, &end);
-            if (end == options.c_str() + at || !std::isfinite(background)) {
-                throw wrong_option("background", "a finite number");
-            }
+        background = lacuna_json_number(lacuna_json(options, "background"), background);
+        if (!std::isfinite(background)) {
+            throw wrong_option("background", "a finite number");
         }
     }
 };
@@ -105,7 +78,7 @@ int32_t schema(const LacunaAnswer *answer)
 
 int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+    return guard(answer, [&] { *out = new Plugin(options); });
 }
 
 void destroy(void *plugin)
@@ -116,9 +89,9 @@ void destroy(void *plugin)
 /* All options with their defaults, which the record of a run keeps. */
 int32_t options(void *plugin, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] {
-        say(answer, R"({"background":)" + digits(static_cast<const Plugin *>(plugin)->background) + "}");
-    });
+    lacuna_say_text(answer, R"({"background":)");
+    lacuna_say_number(answer, static_cast<const Plugin *>(plugin)->background);
+    return lacuna_say_text(answer, "}");
 }
 
 /* ---- the model ---- */
@@ -126,15 +99,11 @@ int32_t options(void *plugin, const LacunaAnswer *answer)
 /* The inputs, with the amplitude in the unit of the response; the response is that of the study. */
 int32_t signature(void *, LacunaText context, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] {
-        const std::string json = string_of(context);
-        const size_t unit = after(json, R"("unit":")", after(json, R"("layout":)"));
-        const std::string of_response = unit == std::string::npos ? "1" : json.substr(unit, json.find('"', unit) - unit);
-        say(answer, R"({"inputs":[{"name":"amplitude","default":1.0,"low":null,"high":null,"unit":")" + of_response +
-                        R"(","description":"the response at time zero, less the background"},)"
-                        R"({"name":"rate","default":1.0,"low":null,"high":null,"unit":"1/s",)"
-                        R"("description":"the share that decays in a unit of time"}],"resamples":true})");
-    });
+    lacuna_say_text(answer, R"({"inputs":[{"name":"amplitude","default":1.0,"low":null,"high":null,"unit":)");
+    lacuna_say_value(answer, lacuna_json(context, "layout/unit"));
+    return lacuna_say_text(answer, R"(,"description":"the response at time zero, less the background"},)"
+                                   R"({"name":"rate","default":1.0,"low":null,"high":null,"unit":"1/s",)"
+                                   R"("description":"the share that decays in a unit of time"}],"resamples":true})");
 }
 
 /* The times of the response that is asked for. */
@@ -143,17 +112,14 @@ std::vector<double> times(const LacunaCalls &calls)
     if (calls.inputs.columns != 2) {
         throw std::runtime_error("expected two inputs, `amplitude` and `rate`");
     }
-    const std::string json = string_of(calls.about);
-    const size_t first = after(json, R"("axes":[{"name":"time","coordinates":{"grid":{"values":[)");
-    const size_t end = first == std::string::npos ? first : json.find(']', first);
-    if (end == std::string::npos || json.compare(end, 16, R"(],"unit":"s"}}}])") != 0) {
+    const LacunaText axes = lacuna_json(calls.about, "layout/axes"), grid = lacuna_json(axes, "0/coordinates/grid");
+    if (lacuna_json_count(axes) != 1 || lacuna_json_is(lacuna_json(axes, "0/name"), "time") == 0 ||
+        lacuna_json_is(lacuna_json(grid, "unit"), "s") == 0) {
         throw std::runtime_error("expected a response with one axis, `time` in `s`");
     }
     std::vector<double> t;
-    for (const char *at = json.c_str() + first; at < json.c_str() + end;) {
-        char *behind = nullptr;
-        t.push_back(std::strtod(at, &behind));
-        at = behind + 1;
+    for (LacunaEach each = lacuna_json_each(lacuna_json(grid, "values")); lacuna_json_next(&each) != 0;) {
+        t.push_back(lacuna_json_number(each.value, 0.0));
     }
     return t;
 }

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -42,18 +41,6 @@ int32_t guard(const LacunaAnswer *answer, Act act) noexcept
     }
 }
 
-std::string string_of(LacunaText text)
-{
-    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
-}
-
-/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
-size_t after(const std::string &json, const std::string &piece, size_t from = 0)
-{
-    const size_t at = from == std::string::npos ? from : json.find(piece, from);
-    return at == std::string::npos ? at : at + piece.size();
-}
-
 Rejected wrong_option(const std::string &key, const std::string &expected)
 {
     return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
@@ -65,15 +52,13 @@ Rejected wrong_option(const std::string &key, const std::string &expected)
 struct Plugin {
     bool about_mean = false;
 
-    explicit Plugin(const std::string &options)
+    explicit Plugin(LacunaText options)
     {
-        const size_t at = after(options, R"("about_mean":)");
-        if (at != std::string::npos) {
-            about_mean = options.compare(at, 4, "true") == 0;
-            if (!about_mean && options.compare(at, 5, "false") != 0) {
-                throw wrong_option("about_mean", "true or false");
-            }
+        const int given = lacuna_json_true(lacuna_json(options, "about_mean"), 0);
+        if (given < 0) {
+            throw wrong_option("about_mean", "true or false");
         }
+        about_mean = given == 1;
     }
 };
 
@@ -95,7 +80,7 @@ int32_t schema(const LacunaAnswer *answer)
 
 int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+    return guard(answer, [&] { *out = new Plugin(options); });
 }
 
 void destroy(void *plugin)
@@ -158,10 +143,7 @@ int32_t of_curve(void *, uint8_t *curve, const LacunaAnswer *)
 int32_t bind(void *plugin, LacunaText arguments, LacunaFunctional *out, const LacunaAnswer *answer)
 {
     return guard(answer, [&] {
-        const std::string json = string_of(arguments);
-        const size_t grid = after(json, R"("grid":[)");
-        /* A comma stands between the numbers of the grid. */
-        if (grid == std::string::npos || json.find(',', grid) > json.find(']', grid)) {
+        if (lacuna_json_count(lacuna_json(arguments, "curve/grid")) < 2) {
             throw Rejected(R"([{"at":"use","message":"a curve of one point has no crest factor",)"
                            R"("help":["widen the `window`"]}])");
         }

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <limits>
 #include <stdexcept>
@@ -52,42 +51,29 @@ std::string string_of(LacunaText text)
     return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
 }
 
-/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
-size_t after(const std::string &json, const std::string &piece, size_t from = 0)
-{
-    const size_t at = from == std::string::npos ? from : json.find(piece, from);
-    return at == std::string::npos ? at : at + piece.size();
-}
-
 Rejected wrong_option(const std::string &key, const std::string &expected)
 {
     return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
                     "\"}]");
 }
 
-/* The text that a JSON string stands for, from behind its opening quote; `at` goes behind the closing one. */
-std::string unquoted(const std::string &json, size_t &at)
+/* The text that a JSON string stands for; empty if the value is no string. */
+std::string unquoted(LacunaText json)
 {
-    std::string text;
-    for (; at < json.size() && json[at] != '"'; ++at) {
-        at += json[at] == '\\' && at + 1 < json.size();
-        text += json[at];
-    }
-    ++at;
+    const size_t length = lacuna_json_string(json, nullptr, 0);
+    std::string text(length == SIZE_MAX ? 0 : length, ' ');
+    lacuna_json_string(json, text.data(), text.size() + 1);
     return text;
 }
 
 /* A JSON string. */
 std::string quoted(const std::string &text)
 {
-    std::string json = "\"";
-    for (const char c : text) {
-        if (c == '"' || c == '\\') {
-            json += '\\';
-        }
-        json += c;
-    }
-    return json + '"';
+    std::string json;
+    const auto append = [](void *to, LacunaText piece) { *static_cast<std::string *>(to) += string_of(piece); };
+    const LacunaAnswer answer{sizeof answer, &json, append, nullptr};
+    lacuna_say_string(&answer, text.c_str());
+    return json;
 }
 
 /* ---- the options ---- */
@@ -95,24 +81,21 @@ std::string quoted(const std::string &text)
 struct Plugin {
     std::string path; /* empty where there is none */
 
-    explicit Plugin(const std::string &options)
+    explicit Plugin(LacunaText options)
     {
-        size_t at = after(options, R"("path":)");
-        if (at != std::string::npos) {
-            if (options[at++] != '"') {
-                throw wrong_option("path", "the path of a file");
-            }
-            path = unquoted(options, at);
+        const LacunaText given = lacuna_json(options, "path");
+        path = unquoted(given);
+        if (given.length > 0 && lacuna_json_string(given, nullptr, 0) == SIZE_MAX) {
+            throw wrong_option("path", "the path of a file");
         }
     }
 
-    std::string file(const std::string &source) const
+    std::string file(LacunaText source) const
     {
-        size_t at = after(source, R"("directory":")");
-        if (path.empty() || at == std::string::npos) {
+        if (path.empty()) {
             throw Rejected("missing key `path`: the file with the measurements");
         }
-        return path[0] == '/' ? path : unquoted(source, at) + "/" + path;
+        return path[0] == '/' ? path : unquoted(lacuna_json(source, "directory")) + "/" + path;
     }
 };
 
@@ -131,7 +114,7 @@ int32_t schema(const LacunaAnswer *answer)
 
 int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+    return guard(answer, [&] { *out = new Plugin(options); });
 }
 
 void destroy(void *plugin)
@@ -233,23 +216,18 @@ struct Response {
     size_t column = 0, size = 1;
     std::vector<Axis> axes;
 
-    Response(const std::string &json, const Sheet &sheet)
+    Response(LacunaText layout, const Sheet &sheet) : column(sheet.column(unquoted(lacuna_json(layout, "name"))))
     {
-        const size_t layout = after(json, R"("layout":)");
-        size_t at = after(json, R"({"name":")", layout == std::string::npos ? 0 : layout);
-        column = sheet.column(unquoted(json, at));
-        for (at = after(json, R"("axes":[)", at); (at = after(json, R"({"name":")", at)) != std::string::npos;) {
+        for (LacunaEach each = lacuna_json_each(lacuna_json(layout, "axes")); lacuna_json_next(&each) != 0;) {
             Axis axis;
-            axis.column = sheet.column(unquoted(json, at));
-            at = json.find('[', after(json, R"("coordinates":{)", at));
-            /* Each entry stands behind a bracket or a comma. */
-            while (at < json.size() && json[at] != ']' && json[at + 1] != ']') {
-                if (json[at + 1] == '"') {
-                    axis.labels.push_back(unquoted(json, at += 2));
-                } else {
-                    axis.grid.push_back(std::strtod(json.c_str() + at + 1, nullptr));
-                    at = json.find_first_of(",]", at + 1);
-                }
+            axis.column = sheet.column(unquoted(lacuna_json(each.value, "name")));
+            LacunaEach place = lacuna_json_each(lacuna_json(each.value, "coordinates/labels"));
+            while (lacuna_json_next(&place) != 0) {
+                axis.labels.push_back(unquoted(place.value));
+            }
+            place = lacuna_json_each(lacuna_json(each.value, "coordinates/grid/values"));
+            while (lacuna_json_next(&place) != 0) {
+                axis.grid.push_back(lacuna_json_number(place.value, missing));
             }
             size *= axis.labels.size() + axis.grid.size();
             axes.push_back(std::move(axis));
@@ -279,7 +257,7 @@ int32_t response(void *, LacunaText path, LacunaText layout, size_t outputs, dou
 {
     return guard(answer, [&] {
         const Sheet sheet(string_of(path));
-        const Response wanted(string_of(layout), sheet);
+        const Response wanted(layout, sheet);
         std::vector<double> values(outputs, missing);
         for (const Cells &cells : sheet.lines) {
             wanted.put(sheet, cells, values);
@@ -337,16 +315,15 @@ int32_t files(void *plugin, LacunaText source, const LacunaAnswer *answer)
 {
     return guard(answer, [&] {
         const auto &p = *static_cast<const Plugin *>(plugin);
-        say(answer, p.path.empty() ? "[]" : "[" + quoted(p.file(string_of(source))) + "]");
+        say(answer, p.path.empty() ? "[]" : "[" + quoted(p.file(source)) + "]");
     });
 }
 
 int32_t measurements(void *plugin, LacunaText source, const LacunaAnswer *answer)
 {
     return guard(answer, [&] {
-        const std::string json = string_of(source);
-        const Sheet sheet(static_cast<const Plugin *>(plugin)->file(json));
-        const Response wanted(json, sheet);
+        const Sheet sheet(static_cast<const Plugin *>(plugin)->file(source));
+        const Response wanted(lacuna_json(source, "layout"), sheet);
         const size_t replicate = sheet.column("replicate");
         Cells names;
         std::vector<std::vector<double>> rows;

@@ -9,10 +9,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <random>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -48,30 +44,10 @@ int32_t guard(const LacunaAnswer *answer, Act act) noexcept
     }
 }
 
-std::string string_of(LacunaText text)
-{
-    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
-}
-
-/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
-size_t after(const std::string &json, const std::string &piece, size_t from = 0)
-{
-    const size_t at = from == std::string::npos ? from : json.find(piece, from);
-    return at == std::string::npos ? at : at + piece.size();
-}
-
 Rejected wrong_option(const std::string &key, const std::string &expected)
 {
     return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
                     "\"}]");
-}
-
-/* A number with all its digits. */
-std::string digits(double x)
-{
-    char text[32];
-    std::snprintf(text, sizeof text, "%.17g", x);
-    return text;
 }
 
 /* ---- the options ---- */
@@ -80,27 +56,20 @@ struct Plugin {
     size_t chains = 4, steps = 10000;
     double width = 0.5;
 
-    explicit Plugin(const std::string &options)
+    explicit Plugin(LacunaText options)
     {
         chains = whole(options, "chains", 2, chains);
         steps = whole(options, "steps", 1, steps);
-        width = number(options, "width", width);
+        width = lacuna_json_number(lacuna_json(options, "width"), width);
         if (!(width > 0.0 && std::isfinite(width))) {
             throw wrong_option("width", "a number above 0");
         }
     }
 
 private:
-    /* What is no number reads as zero. */
-    static double number(const std::string &options, const std::string &key, double usual)
+    static size_t whole(LacunaText options, const char *key, size_t least, size_t usual)
     {
-        const size_t at = after(options, "\"" + key + "\":");
-        return at == std::string::npos ? usual : std::strtod(options.c_str() + at, nullptr);
-    }
-
-    static size_t whole(const std::string &options, const std::string &key, size_t least, size_t usual)
-    {
-        const double found = number(options, key, static_cast<double>(usual));
+        const double found = lacuna_json_number(lacuna_json(options, key), static_cast<double>(usual));
         if (!(found >= static_cast<double>(least) && found <= 1e15 && std::floor(found) == found)) {
             throw wrong_option(key, "a whole number from " + std::to_string(least));
         }
@@ -134,7 +103,7 @@ int32_t schema(const LacunaAnswer *answer)
 
 int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+    return guard(answer, [&] { *out = new Plugin(options); });
 }
 
 void destroy(void *plugin)
@@ -145,11 +114,14 @@ void destroy(void *plugin)
 /* All options with their defaults, which the record of a run keeps. */
 int32_t options(void *plugin, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] {
-        const auto &p = *static_cast<const Plugin *>(plugin);
-        say(answer, R"({"chains":)" + std::to_string(p.chains) + R"(,"steps":)" + std::to_string(p.steps) +
-                        R"(,"width":)" + digits(p.width) + "}");
-    });
+    const auto &p = *static_cast<const Plugin *>(plugin);
+    lacuna_say_text(answer, R"({"chains":)");
+    lacuna_say_number(answer, static_cast<double>(p.chains));
+    lacuna_say_text(answer, R"(,"steps":)");
+    lacuna_say_number(answer, static_cast<double>(p.steps));
+    lacuna_say_text(answer, R"(,"width":)");
+    lacuna_say_number(answer, p.width);
+    return lacuna_say_text(answer, "}");
 }
 
 /* ---- the sampler ---- */
@@ -196,23 +168,20 @@ std::vector<double> widths(const LacunaTarget &target, const LacunaAnswer *answe
 }
 
 /* The memory of a run is a JSON list of the widths. */
-std::string written(const std::vector<double> &widths)
+void write(const std::vector<double> &widths, const LacunaAnswer *answer)
 {
-    std::string list;
-    for (const double width : widths) {
-        list += (list.empty() ? "[" : ",") + digits(width);
+    for (size_t j = 0; j < widths.size(); ++j) {
+        say(answer, j == 0 ? "[" : ",");
+        lacuna_say_number(answer, widths[j]);
     }
-    return list.empty() ? "[]" : list + "]";
+    say(answer, widths.empty() ? "[]" : "]");
 }
 
-std::vector<double> read(const std::string &memory)
+std::vector<double> read(LacunaText memory)
 {
     std::vector<double> widths;
-    /* Each number stands behind a bracket or a comma. */
-    for (const char *at = memory.c_str(); *at == '[' || *at == ',';) {
-        char *end = nullptr;
-        widths.push_back(std::strtod(at + 1, &end));
-        at = end;
+    for (LacunaEach each = lacuna_json_each(memory); lacuna_json_next(&each) != 0;) {
+        widths.push_back(lacuna_json_number(each.value, 0.0));
     }
     return widths;
 }
@@ -232,7 +201,7 @@ int32_t start(void *plugin, const LacunaTarget *target, LacunaState *state, cons
         std::copy(density.begin(), density.end(), state->log_density);
         std::fill_n(state->accepted, chains, uint8_t{0});
         state->evaluations = chains;
-        say(answer, written(widths(*target, answer)));
+        write(widths(*target, answer), answer);
     });
 }
 
@@ -242,19 +211,16 @@ int32_t step(void *plugin, const LacunaTarget *target, LacunaState *state, Lacun
     return guard(answer, [&] {
         const double width = static_cast<const Plugin *>(plugin)->width;
         const size_t chains = state->chains, dimension = state->dimension;
-        const auto widths = read(string_of(state->memory));
-        std::mt19937_64 random(key.words[0]);
-        std::normal_distribution<double> normal;
-        std::exponential_distribution<double> below;
+        const auto widths = read(state->memory);
+        LacunaRandom random = lacuna_random(key);
         std::vector<double> tried(state->points, state->points + chains * dimension);
         for (size_t at = 0; at < tried.size(); ++at) {
-            tried[at] += width * widths.at(at % dimension) * normal(random);
+            tried[at] += width * widths.at(at % dimension) * lacuna_normal(&random);
         }
         const auto density = log_density(*target, tried.data(), chains, answer);
         state->evaluations += chains;
         for (size_t i = 0; i < chains; ++i) {
-            /* The logarithm of a uniform number is that below zero. */
-            state->accepted[i] = -below(random) < density[i] - state->log_density[i];
+            state->accepted[i] = std::log(lacuna_uniform(&random)) < density[i] - state->log_density[i];
             if (state->accepted[i] != 0) {
                 std::copy_n(&tried[i * dimension], dimension, state->points + i * dimension);
                 state->log_density[i] = density[i];

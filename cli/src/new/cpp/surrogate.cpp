@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <stdexcept>
@@ -49,18 +48,6 @@ int32_t guard(const LacunaAnswer *answer, Act act) noexcept
     }
 }
 
-std::string string_of(LacunaText text)
-{
-    return text.length == 0 ? std::string() : std::string(reinterpret_cast<const char *>(text.bytes), text.length);
-}
-
-/* The place behind a piece of JSON, which the program writes without blanks; npos if it does not have the piece. */
-size_t after(const std::string &json, const std::string &piece, size_t from = 0)
-{
-    const size_t at = from == std::string::npos ? from : json.find(piece, from);
-    return at == std::string::npos ? at : at + piece.size();
-}
-
 Rejected wrong_option(const std::string &key, const std::string &expected)
 {
     return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
@@ -72,13 +59,9 @@ Rejected wrong_option(const std::string &key, const std::string &expected)
 struct Plugin {
     double length = 1.0;
 
-    explicit Plugin(const std::string &options)
+    explicit Plugin(LacunaText options)
     {
-        const size_t at = after(options, R"("length":)");
-        if (at != std::string::npos) {
-            /* What is no number reads as zero. */
-            length = std::strtod(options.c_str() + at, nullptr);
-        }
+        length = lacuna_json_number(lacuna_json(options, "length"), length);
         if (!(length > 0.0 && std::isfinite(length))) {
             throw wrong_option("length", "a number above 0");
         }
@@ -102,7 +85,7 @@ int32_t schema(const LacunaAnswer *answer)
 
 int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    return guard(answer, [&] { *out = new Plugin(string_of(options)); });
+    return guard(answer, [&] { *out = new Plugin(options); });
 }
 
 void destroy(void *plugin)
