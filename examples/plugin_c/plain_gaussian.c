@@ -11,50 +11,10 @@
 #include "lacuna_plugin.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define TWO_PI 6.283185307179586
-
-/* ---- texts ---- */
-
-static int32_t refuse(const LacunaAnswer *answer, int32_t status, const char *reason)
-{
-    lacuna_say(answer, reason, strlen(reason));
-    return status;
-}
-
-static int32_t answer_text(const LacunaAnswer *answer, const char *text)
-{
-    return refuse(answer, LACUNA_OK, text);
-}
-
-/* The text after `"key":` in machine-written JSON; NULL if there is no such key. */
-static const char *value_of(const char *json, const char *key)
-{
-    char quoted[64];
-    const char *at;
-    snprintf(quoted, sizeof quoted, "\"%s\":", key);
-    at = strstr(json, quoted);
-    if (at == NULL) {
-        return NULL;
-    }
-    at += strlen(quoted);
-    return at + strspn(at, " \t\n");
-}
-
-static char *copy_of(LacunaText text)
-{
-    char *copy = malloc(text.length + 1);
-    if (copy != NULL) {
-        if (text.length > 0) {
-            memcpy(copy, text.bytes, text.length);
-        }
-        copy[text.length] = '\0';
-    }
-    return copy;
-}
 
 /* ---- the plugin ---- */
 
@@ -64,7 +24,7 @@ typedef struct {
 
 static int32_t schema(const LacunaAnswer *answer)
 {
-    return answer_text(answer,
+    return lacuna_say_text(answer,
         "{\"type\":\"object\",\"description\":\"Independent normal differences of one unknown variance. "
         "The example of a plugin in C.\",\"additionalProperties\":false,\"required\":[\"scale\"],\"properties\":{"
         "\"scale\":{\"type\":\"number\",\"exclusiveMinimum\":0,\"description\":\"The scale of the half-normal prior "
@@ -73,20 +33,16 @@ static int32_t schema(const LacunaAnswer *answer)
 
 static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    char *text = copy_of(options);
-    Plugin *plugin = malloc(sizeof *plugin);
-    const char *scale = text == NULL ? NULL : value_of(text, "scale");
-    char *end = NULL;
-    if (plugin != NULL && scale != NULL) {
-        plugin->scale = strtod(scale, &end);
+    const double scale = lacuna_json_number(lacuna_json(options, "scale"), NAN);
+    Plugin *plugin;
+    if (!(scale > 0.0) || isinf(scale)) {
+        return lacuna_wrong_option(answer, "scale", "a number above 0");
     }
-    if (plugin == NULL || scale == NULL || end == scale || !(plugin->scale > 0.0) || isinf(plugin->scale)) {
-        free(plugin);
-        free(text);
-        return refuse(answer, LACUNA_REJECTED,
-            "[{\"at\":\"scale\",\"message\":\"wrong value for `scale`\",\"expected\":\"a number above 0\"}]");
+    plugin = malloc(sizeof *plugin);
+    if (plugin == NULL) {
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
-    free(text);
+    plugin->scale = scale;
     *out = plugin;
     return LACUNA_OK;
 }
@@ -216,11 +172,13 @@ static double square_sum(const Likelihood *l, const Solved *s)
 static int32_t hyperparameters(void *object, const LacunaAnswer *answer)
 {
     const Likelihood *l = object;
-    char text[512];
-    snprintf(text, sizeof text,
-        "[{\"name\":\"variance\",\"symbol\":\"v\",\"unit\":\"%s\",\"prior\":{\"half_normal\":%.17g},\"log\":true,"
-        "\"start\":%.17g}]", l->unit, l->scale, l->scale);
-    return answer_text(answer, text);
+    lacuna_say_text(answer, "[{\"name\":\"variance\",\"symbol\":\"v\",\"unit\":");
+    lacuna_say_string(answer, l->unit);
+    lacuna_say_text(answer, ",\"prior\":{\"half_normal\":");
+    lacuna_say_number(answer, l->scale);
+    lacuna_say_text(answer, "},\"log\":true,\"start\":");
+    lacuna_say_number(answer, l->scale);
+    return lacuna_say_text(answer, "}]");
 }
 
 static int32_t log_likelihood(void *object, LacunaNumbers responses, LacunaNumbers hyper, double *values,
@@ -237,7 +195,7 @@ static int32_t log_likelihood(void *object, LacunaNumbers responses, LacunaNumbe
             continue;
         }
         if (!begin_solved(l, responses.values + point * responses.columns, v, &s)) {
-            return refuse(answer, LACUNA_STOP, "there is no memory left");
+            return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
         }
         twice = l->count * log(TWO_PI * v) + square_sum(l, &s) / v;
         for (j = 0; j < l->rank; ++j) {
@@ -265,7 +223,7 @@ static int32_t gradient(void *object, LacunaNumbers responses, LacunaNumbers hyp
             continue;
         }
         if (!begin_solved(l, responses.values + point * responses.columns, v, &s)) {
-            return refuse(answer, LACUNA_STOP, "there is no memory left");
+            return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
         }
         for (i = 0; i < l->outputs; ++i) {
             slopes[i] = l->number[i] * s.error[i] / v;
@@ -275,7 +233,7 @@ static int32_t gradient(void *object, LacunaNumbers responses, LacunaNumbers hyp
             double *unit = calloc(l->rank, sizeof *unit);
             if (unit == NULL) {
                 end_solved(&s);
-                return refuse(answer, LACUNA_STOP, "there is no memory left");
+                return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
             }
             unit[j] = 1.0;
             solve(s.a, l->rank, unit);
@@ -295,7 +253,7 @@ static int32_t predictive(void *object, LacunaNumbers response, LacunaNumbers hy
     size_t i;
     (void)response;
     if (parts == NULL) {
-        return refuse(answer, LACUNA_STOP, "there is no memory left");
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
     for (i = 0; i < l->outputs; ++i) {
         parts[i] = hyper.values[0];
@@ -303,44 +261,29 @@ static int32_t predictive(void *object, LacunaNumbers response, LacunaNumbers hy
     }
     lacuna_give(answer, parts, 2, l->outputs);
     free(parts);
-    return answer_text(answer, "[\"discrepancy\",\"common\"]");
-}
-
-/* SplitMix64 and the Box-Muller method: sufficient for an example. */
-static double uniform(uint64_t *state)
-{
-    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return ((double)((z ^ (z >> 31)) >> 11) + 0.5) / 9007199254740992.0;
-}
-
-static double normal(uint64_t *state)
-{
-    const double radius = sqrt(-2.0 * log(uniform(state)));
-    return radius * cos(TWO_PI * uniform(state));
+    return lacuna_say_text(answer, "[\"discrepancy\",\"common\"]");
 }
 
 static int32_t simulate(void *object, LacunaNumbers response, LacunaNumbers hyper, LacunaKey key, double *values,
                         const LacunaAnswer *answer)
 {
     const Likelihood *l = object;
-    uint64_t state = key.words[0];
+    LacunaRandom random = lacuna_random(key);
     double *curve = malloc((l->outputs + 1) * sizeof *curve);
     size_t i, j, k;
     if (curve == NULL) {
-        return refuse(answer, LACUNA_STOP, "there is no memory left");
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
     memcpy(curve, response.values, l->outputs * sizeof *curve);
     for (j = 0; j < l->rank; ++j) {
-        const double z = normal(&state);
+        const double z = lacuna_normal(&random);
         for (i = 0; i < l->outputs && l->added[j]; ++i) {
             curve[i] += l->factor[i * l->rank + j] * z;
         }
     }
     for (k = 0; k < l->replicates; ++k) {
         for (i = 0; i < l->outputs; ++i) {
-            values[k * l->outputs + i] = curve[i] + sqrt(hyper.values[0]) * normal(&state);
+            values[k * l->outputs + i] = curve[i] + sqrt(hyper.values[0]) * lacuna_normal(&random);
         }
     }
     free(curve);
@@ -411,18 +354,18 @@ static int gather(Likelihood *l, const LacunaKnown *known)
     return 1;
 }
 
-/* The squared unit of the response: the first "unit" of the layout is that of the response. */
-static void read_unit(Likelihood *l, LacunaText about)
+/* The squared unit of the response; returns 0 if there is no room for it. */
+static int read_unit(Likelihood *l, LacunaText about)
 {
-    char *text = copy_of(about);
-    const char *unit = text == NULL ? NULL : value_of(text, "unit");
-    const size_t length = unit == NULL || *unit != '"' ? 0 : strcspn(unit + 1, "\"");
-    if (length == 0 || length > 40 || (length == 1 && unit[1] == '1')) {
-        strcpy(l->unit, "1");
-    } else {
-        snprintf(l->unit, sizeof l->unit, "(%.*s)^2", (int)length, unit + 1);
+    char unit[sizeof l->unit - sizeof "()^2"];
+    if (lacuna_json_string(lacuna_json(about, "layout/unit"), unit, sizeof unit) >= sizeof unit) {
+        return 0;
     }
-    free(text);
+    strcpy(l->unit, strcmp(unit, "1") == 0 ? "1" : "(");
+    if (l->unit[0] == '(') {
+        strcat(strcat(l->unit, unit), ")^2");
+    }
+    return 1;
 }
 
 static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikelihood *out, const LacunaAnswer *answer)
@@ -430,7 +373,7 @@ static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikeliho
     Likelihood *l = calloc(1, sizeof *l);
     size_t c;
     if (l == NULL) {
-        return refuse(answer, LACUNA_STOP, "there is no memory left");
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
     l->outputs = known->values.columns;
     l->replicates = known->values.rows;
@@ -445,21 +388,24 @@ static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikeliho
     l->added = calloc(l->rank + 1, sizeof *l->added);
     if (!l->number || !l->mean || !l->predictive || !l->factor || !l->added) {
         end_likelihood(l);
-        return refuse(answer, LACUNA_STOP, "there is no memory left");
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
     if (!summarise(l, known)) {
         end_likelihood(l);
-        return refuse(answer, LACUNA_STOP, "a measured value is not finite");
+        return lacuna_fail(answer, LACUNA_STOP, "a measured value is not finite");
     }
     if (l->count == 0.0) {
         end_likelihood(l);
-        return refuse(answer, LACUNA_STOP, "nothing was measured");
+        return lacuna_fail(answer, LACUNA_STOP, "nothing was measured");
     }
     if (!gather(l, known)) {
         end_likelihood(l);
-        return refuse(answer, LACUNA_STOP, "a common error is of another shape than the response");
+        return lacuna_fail(answer, LACUNA_STOP, "a common error is of another shape than the response");
     }
-    read_unit(l, known->about);
+    if (!read_unit(l, known->about)) {
+        end_likelihood(l);
+        return lacuna_fail(answer, LACUNA_STOP, "the response has no unit, or one that is too long");
+    }
     out->size = sizeof *out;
     out->likelihood = l;
     out->functions = &likelihood_functions;

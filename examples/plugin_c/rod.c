@@ -19,33 +19,6 @@
 #define PI 3.141592653589793
 #define MOST_STEPS 1e9
 
-/* ---- texts ---- */
-
-static int32_t say(const LacunaAnswer *answer, int32_t status, const char *text)
-{
-    lacuna_say(answer, text, strlen(text));
-    return status;
-}
-
-static char *copy_of(LacunaText text)
-{
-    char *copy = malloc(text.length + 1);
-    if (copy != NULL) {
-        if (text.length > 0) {
-            memcpy(copy, text.bytes, text.length);
-        }
-        copy[text.length] = '\0';
-    }
-    return copy;
-}
-
-/* The text after a piece of JSON; NULL if the piece is not present. */
-static const char *after(const char *json, const char *piece)
-{
-    const char *at = json == NULL ? NULL : strstr(json, piece);
-    return at == NULL ? NULL : at + strlen(piece);
-}
-
 /* ---- the options ---- */
 
 typedef struct {
@@ -57,7 +30,7 @@ typedef struct {
 
 static int32_t schema(const LacunaAnswer *answer)
 {
-    return say(answer, LACUNA_OK,
+    return lacuna_say_text(answer,
         "{\"type\":\"object\",\"description\":\"The temperature of a rod whose ends are kept in melting ice. The example of "
         "a simulator in C.\",\"additionalProperties\":false,\"properties\":{"
         "\"length\":{\"type\":\"number\",\"exclusiveMinimum\":0,\"default\":1.0,\"description\":\"The length in m.\"},"
@@ -68,56 +41,32 @@ static int32_t schema(const LacunaAnswer *answer)
         "cells.\"}}}");
 }
 
-/* Reads a positive number if the options have the key; returns 0 if the value is anything else. */
-static int number(const char *options, const char *key, double *value)
+static int is_positive(double x)
 {
-    char quoted[32], *end;
-    const char *at;
-    snprintf(quoted, sizeof quoted, "\"%s\":", key);
-    at = after(options, quoted);
-    if (at == NULL) {
-        return 1;
-    }
-    *value = strtod(at, &end);
-    return end != at && *value > 0.0 && !isinf(*value);
-}
-
-static int32_t wrong_option(const LacunaAnswer *answer, const char *key, const char *expected)
-{
-    char text[200];
-    snprintf(text, sizeof text, "[{\"at\":\"%s\",\"message\":\"wrong value for `%s`\",\"expected\":\"%s\"}]", key, key,
-             expected);
-    return say(answer, LACUNA_REJECTED, text);
+    return x > 0.0 && !isinf(x);
 }
 
 static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
 {
-    const Rod usual = {1.0, 80.0, 1.0, 40};
-    double cells = 40.0;
-    const char *wrong = NULL;
-    char *text = copy_of(options);
-    Rod *rod = malloc(sizeof *rod);
-    if (text == NULL || rod == NULL) {
-        free(text);
-        free(rod);
-        return say(answer, LACUNA_STOP, "there is no memory left");
+    const double length = lacuna_json_number(lacuna_json(options, "length"), 1.0);
+    const double height = lacuna_json_number(lacuna_json(options, "height"), 80.0);
+    const double step = lacuna_json_number(lacuna_json(options, "step"), 1.0);
+    const double cells = lacuna_json_number(lacuna_json(options, "cells"), 40.0);
+    Rod *rod;
+    if (!is_positive(length) || !is_positive(height) || !is_positive(step)) {
+        const char *wrong = !is_positive(length) ? "length" : !is_positive(height) ? "height" : "step";
+        return lacuna_wrong_option(answer, wrong, "a number above 0");
     }
-    *rod = usual;
-    if (!number(text, "length", &rod->length)) {
-        wrong = "length";
-    } else if (!number(text, "height", &rod->height)) {
-        wrong = "height";
-    } else if (!number(text, "step", &rod->step)) {
-        wrong = "step";
-    } else if (!number(text, "cells", &cells) || cells < 4.0 || cells > 1e4 || floor(cells) != cells) {
-        wrong = "cells";
+    if (!(cells >= 4.0 && cells <= 1e4) || floor(cells) != cells) {
+        return lacuna_wrong_option(answer, "cells", "a whole number from 4 to 10000");
     }
-    free(text);
-    if (wrong != NULL) {
-        free(rod);
-        return wrong_option(answer, wrong, strcmp(wrong, "cells") == 0 ? "a whole number from 4 to 10000"
-                                                                       : "a number above 0");
+    rod = malloc(sizeof *rod);
+    if (rod == NULL) {
+        return lacuna_fail(answer, LACUNA_STOP, "there is no memory left");
     }
+    rod->length = length;
+    rod->height = height;
+    rod->step = step;
     rod->cells = (size_t)cells;
     *out = rod;
     return LACUNA_OK;
@@ -126,38 +75,24 @@ static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer
 static int32_t options(void *plugin, const LacunaAnswer *answer)
 {
     const Rod *rod = plugin;
-    char text[200];
-    snprintf(text, sizeof text, "{\"length\":%.17g,\"height\":%.17g,\"step\":%.17g,\"cells\":%lu}", rod->length,
-             rod->height, rod->step, (unsigned long)rod->cells);
-    return say(answer, LACUNA_OK, text);
+    lacuna_say_text(answer, "{\"length\":");
+    lacuna_say_number(answer, rod->length);
+    lacuna_say_text(answer, ",\"height\":");
+    lacuna_say_number(answer, rod->height);
+    lacuna_say_text(answer, ",\"step\":");
+    lacuna_say_number(answer, rod->step);
+    lacuna_say_text(answer, ",\"cells\":");
+    lacuna_say_number(answer, (double)rod->cells);
+    return lacuna_say_text(answer, "}");
 }
 
 /* ---- positions and times ---- */
 
-/* The numbers of an axis in a layout, which are in `unit`; NULL if there is no such axis. */
-static double *axis(const char *layout, const char *name, const char *unit, size_t *count)
+/* 1 if an axis has this name, and a grid in this unit. */
+static int is_axis(LacunaText axis, const char *name, const char *unit)
 {
-    char piece[64];
-    const char *at;
-    char *end;
-    double *values;
-    size_t i;
-    snprintf(piece, sizeof piece, "{\"name\":\"%s\",\"coordinates\":{\"grid\":{\"values\":[", name);
-    at = after(layout, piece);
-    if (at == NULL) {
-        return NULL;
-    }
-    *count = 1;
-    for (i = 0; at[i] != '\0' && at[i] != ']'; ++i) {
-        *count += at[i] == ',';
-    }
-    snprintf(piece, sizeof piece, "],\"unit\":\"%s\"}}}", unit);
-    values = strncmp(at + i, piece, strlen(piece)) == 0 ? malloc(*count * sizeof *values) : NULL;
-    for (i = 0; values != NULL && i < *count; ++i) {
-        values[i] = strtod(at, &end);
-        at = end + 1;
-    }
-    return values;
+    return lacuna_json_is(lacuna_json(axis, "name"), name) &&
+           lacuna_json_is(lacuna_json(axis, "coordinates/grid/unit"), unit);
 }
 
 typedef struct {
@@ -172,18 +107,21 @@ static void end_asked(Asked *asked)
 }
 
 /* The requested positions and, at each of them, increasing times; or the reason why the request is rejected. */
-static const char *begin_asked(const char *json, const Rod *rod, Asked *asked)
+static const char *begin_asked(LacunaText layout, const Rod *rod, Asked *asked)
 {
-    const char *layout = after(json, "\"layout\":");
-    const char *axes = after(layout, "\"axes\":[");
+    const LacunaText axes = lacuna_json(layout, "axes");
     size_t i;
-    asked->x = axis(layout, "position", "m", &asked->positions);
-    asked->t = axis(layout, "time", "s", &asked->times);
-    if (layout == NULL || after(layout, "\"unit\":\"K\"") == NULL || after(layout, "\"unit\":\"K\"") > axes) {
+    if (!lacuna_json_is(lacuna_json(layout, "unit"), "K")) {
         return "expected a response in K";
     }
-    if (asked->x == NULL || asked->t == NULL || strncmp(axes, "{\"name\":\"position\"", 18) != 0) {
+    if (lacuna_json_count(axes) != 2 || !is_axis(lacuna_json(axes, "0"), "position", "m") ||
+        !is_axis(lacuna_json(axes, "1"), "time", "s")) {
         return "expected the axes `position` in m and `time` in s, in this order";
+    }
+    asked->x = lacuna_json_numbers(lacuna_json(axes, "0/coordinates/grid/values"), &asked->positions);
+    asked->t = lacuna_json_numbers(lacuna_json(axes, "1/coordinates/grid/values"), &asked->times);
+    if (asked->x == NULL || asked->t == NULL) {
+        return "there is no memory left";
     }
     for (i = 0; i < asked->positions; ++i) {
         if (!(asked->x[i] >= 0.0 && asked->x[i] <= rod->length)) {
@@ -201,16 +139,14 @@ static const char *begin_asked(const char *json, const Rod *rod, Asked *asked)
 static int32_t check(void *plugin, LacunaText context, const LacunaAnswer *answer)
 {
     Asked asked = {NULL, NULL, 0, 0};
-    char *text = copy_of(context);
-    const char *reason = text == NULL ? "there is no memory left" : begin_asked(text, plugin, &asked);
-    if (reason != NULL) {
-        char complaint[200];
-        snprintf(complaint, sizeof complaint, "[{\"message\":\"the rod cannot give this response: %s\"}]", reason);
-        say(answer, LACUNA_OK, complaint);
-    }
+    const char *reason = begin_asked(lacuna_json(context, "layout"), plugin, &asked);
     end_asked(&asked);
-    free(text);
-    return LACUNA_OK;
+    if (reason == NULL) {
+        return LACUNA_OK;
+    }
+    lacuna_say_text(answer, "[{\"message\":\"the rod cannot give this response: ");
+    lacuna_say_text(answer, reason);
+    return lacuna_say_text(answer, "\"}]");
 }
 
 /* ---- the simulation ---- */
@@ -219,7 +155,7 @@ static int32_t signature(void *plugin, LacunaText context, const LacunaAnswer *a
 {
     (void)plugin;
     (void)context;
-    return say(answer, LACUNA_OK,
+    return lacuna_say_text(answer,
         "{\"inputs\":[{\"name\":\"diffusivity\",\"unit\":\"m2/s\",\"default\":1.1e-4,\"low\":0,\"high\":null,"
         "\"description\":\"how fast heat spreads along the rod\"},"
         "{\"name\":\"loss\",\"unit\":\"1/s\",\"default\":1e-3,\"low\":0,\"high\":null,"
@@ -282,37 +218,37 @@ static int32_t predict(void *plugin, const LacunaCalls *calls, double *responses
 {
     const Rod *rod = plugin;
     Asked asked = {NULL, NULL, 0, 0};
-    char *about = copy_of(calls->about);
     double *u = malloc((rod->cells + 1) * sizeof *u), *next = malloc((rod->cells + 1) * sizeof *next);
-    const char *wrong = about == NULL || u == NULL || next == NULL ? "there is no memory left"
-                                                                   : begin_asked(about, rod, &asked);
+    const char *wrong = u == NULL || next == NULL ? "there is no memory left"
+                                                  : begin_asked(lacuna_json(calls->about, "layout"), rod, &asked);
     int32_t status = LACUNA_OK;
     size_t i;
     if (wrong == NULL && calls->inputs.columns != 2) {
         wrong = "expected two inputs, the diffusivity and the loss";
     }
     if (wrong != NULL) {
-        status = say(answer, LACUNA_FATAL, wrong);
+        status = lacuna_fail(answer, LACUNA_FATAL, wrong);
     }
     for (i = 0; wrong == NULL && i < calls->inputs.rows; ++i) {
         const double *input = calls->inputs.values + 2 * i;
-        char reason[200], said[256];
+        char reason[200];
         refusal(rod, input[0], input[1], reason, sizeof reason);
         valid[i] = 1;
         statuses[i] = reason[0] == '\0' ? LACUNA_OK : LACUNA_REJECTED;
+        lacuna_say_text(answer, i == 0 ? "[" : ",");
         if (statuses[i] == LACUNA_OK) {
             simulate(rod, &asked, input[0], input[1], u, next, responses + i * asked.positions * asked.times);
-            snprintf(said, sizeof said, "%snull", i == 0 ? "[" : ",");
+            lacuna_say_text(answer, "null");
         } else {
-            snprintf(said, sizeof said, "%s{\"message\":\"%s\"}", i == 0 ? "[" : ",", reason);
+            lacuna_say_text(answer, "{\"message\":");
+            lacuna_say_string(answer, reason);
+            lacuna_say_text(answer, "}");
         }
-        say(answer, LACUNA_OK, said);
     }
     if (wrong == NULL && calls->inputs.rows > 0) {
-        say(answer, LACUNA_OK, "]");
+        lacuna_say_text(answer, "]");
     }
     end_asked(&asked);
-    free(about);
     free(u);
     free(next);
     return status;
