@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use crate::quick::{command, summary};
 
 /// Kinds that libraries can provide, each with a wrong option of its skeleton and the complaint about it.
-const KINDS: [(&str, &str, &str); 8] = [
+pub const KINDS: [(&str, &str, &str); 8] = [
     ("design", "random_start=1", "true or false"),
     ("discrepancy", "scale=0", "a number above 0"),
     ("effect", "deviation='wide'", "a number above 0"),
