@@ -105,7 +105,7 @@ fn line(options: &str) -> Result<Object<ModelFunctions>, Refusal> {
     made(&entry, functions, options)
 }
 
-/// What `predict` writes for some slopes: responses, statuses, marks of validity, and the reply.
+/// Responses, statuses and marks of validity that `predict` writes for some slopes, and the reply.
 fn predicted(slopes: &[f64]) -> (Matrix, Vec<i32>, Vec<u8>, Result<Reply, Refusal>) {
     let line = line(r#"{"offset": 2.0}"#).unwrap();
     let inputs = Matrix::from_vec(slopes.len(), 1, slopes.to_vec());

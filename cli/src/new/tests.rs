@@ -109,8 +109,9 @@ fn a_skeleton_that_is_compiled_has_its_name_in_texts_alone() {
         }
     }
     let beginning = |text: &'static str| {
-        let begin = text.find("struct Rejected").unwrap();
-        &text[begin..text.find("\nRejected wrong_option").unwrap()]
+        let (_, text) = text.split_at(text.find("struct Rejected").unwrap());
+        let guard = text.find("int32_t guard(").unwrap();
+        &text[..guard + text[guard..].find("\n}\n").unwrap()]
     };
     let first = beginning(IN_CPP[0].1);
     for (kind, text) in IN_CPP {

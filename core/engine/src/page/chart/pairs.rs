@@ -32,7 +32,7 @@ const WIDE: usize = 6;
 const LETTERS: usize = 23;
 
 /// Smallest width of a hexagon.
-const NARROWEST: f64 = 11.0;
+const NARROWEST: f64 = 9.0;
 
 /// Number of shades of the hexagons, from rare to frequent.
 const SHADES: usize = 6;

@@ -14,7 +14,7 @@ use crate::stage::screen::Z975;
 use crate::stage::validate::ValidationFindings;
 
 /// Largest number of points of all drawn curves together.
-const MOST_POINTS: usize = 36_000;
+const MOST_POINTS: usize = 30_000;
 
 /// Smallest number of draws that is drawn, if there are as many.
 const FEWEST: usize = 10;

@@ -11,7 +11,7 @@ use crate::page::{Caption, Numbers, Section, paragraph};
 use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings};
 
 /// Approximate total number of points of all traces.
-const MOST_POINTS: usize = 32_000;
+const MOST_POINTS: usize = 24_000;
 
 /// Approximate number of chains that are drawn.
 const MOST_CHAINS: usize = 100;
