@@ -94,12 +94,12 @@ const END: &str = r#"/* A text from a string literal. */
 const HELPERS: [&str; 3] =
     [include_str!("header/json.h"), include_str!("header/say.h"), include_str!("header/random.h")];
 
-const CLOSE: &str = r#"#ifdef __cplusplus
+const CLOSE: &str = r"#ifdef __cplusplus
 }
 #endif
 
 #endif
-"#;
+";
 
 /// The longest line of a comment.
 const WIDTH: usize = 116;
