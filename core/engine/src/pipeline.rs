@@ -216,7 +216,8 @@ pub fn emulate(
     let numerics = numerical_error::stage(trained, &data, place, &folders, run, observer)?;
     let numerics = numerics.map(|own| grouped::numerical_error(study, own));
     let (data, fitted) = grouped::by_group(study, data, fitted);
-    let emulated = Emulated { region, ..Emulated::new(study, data, fitted, numerics, None)? };
+    let mut emulated = Emulated::new(study, data, fitted, numerics, None)?;
+    emulated.region = region;
     runs::build_added(study, &emulated.problem(), run, observer)?;
     Ok(emulated)
 }

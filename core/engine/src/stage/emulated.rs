@@ -1,11 +1,13 @@
 //! Emulator of a model, fitted to runs, with its errors and the measurements.
 
+use std::sync::Arc;
+
 use lacuna::plugin::{Emulator, Forward};
 use lacuna::run::{Stop, files};
 use lacuna_run::Kept;
 use serde_json::json;
 
-use super::inverse_problem::{InverseProblem, Route, Trial};
+use super::inverse_problem::{Derived, InverseProblem, Route, Trial};
 use super::numerical_error::NumericalError;
 use super::read::Data;
 use super::refine::Refinement;
@@ -32,6 +34,8 @@ pub struct Emulated {
     pub refinement: Option<Refinement>,
     /// Trial that the data belong to; see [`InverseProblem::trial`].
     pub trial: Option<Trial>,
+    /// Results for the data, shared by the problems that are made of this.
+    derived: Arc<Derived>,
 }
 
 impl Emulated {
@@ -56,7 +60,19 @@ impl Emulated {
             _ => fitted.hash.clone(),
         };
         let (region, refinement) = (None, None);
-        Ok(Self { data, fitted, numerics, emulator, corrected, origin, region, refinement, trial })
+        let derived = Arc::default();
+        Ok(Self {
+            data,
+            fitted,
+            numerics,
+            emulator,
+            corrected,
+            origin,
+            region,
+            refinement,
+            trial,
+            derived,
+        })
     }
 
     /// The emulator, including the predicted numerical error.
@@ -66,6 +82,6 @@ impl Emulated {
 
     /// The data with this emulator as the forward map.
     pub fn problem(&self) -> InverseProblem<'_> {
-        InverseProblem::new(&self.data, Route::Emulated(self), self.trial)
+        InverseProblem::new(&self.data, Route::Emulated(self), self.trial).sharing(&self.derived)
     }
 }

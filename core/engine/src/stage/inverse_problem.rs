@@ -1,6 +1,6 @@
 //! Inverse problem that calibration solves: data, forward map, and the errors of that map.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use lacuna::data::Observations;
 use lacuna::math::random::Stream;
@@ -29,6 +29,15 @@ pub enum Route<'a> {
     Direct(&'a Direct<'a>),
 }
 
+/// Results that follow from the data and the forward map, each computed on first use.
+#[derive(Default)]
+pub struct Derived {
+    /// Errors of emulator and numerics for these data.
+    allowances: OnceLock<Vec<Allowance>>,
+    /// Least-squares best fit to these data.
+    best_fit: OnceLock<BestFit>,
+}
+
 /// Data, and a forward map from parameters to responses.
 pub struct InverseProblem<'a> {
     /// Runs and measurements.
@@ -37,16 +46,19 @@ pub struct InverseProblem<'a> {
     pub route: Route<'a>,
     /// Trial that the data belong to, if they were generated and not measured.
     pub trial: Option<Trial>,
-    /// Errors of emulator and numerics for these data, computed on first use.
-    allowances: OnceLock<Vec<Allowance>>,
-    /// Least-squares best fit to these data, computed on first use.
-    best_fit: OnceLock<BestFit>,
+    /// Results for these data, which all problems of the same data and map share.
+    derived: Arc<Derived>,
 }
 
 impl<'a> InverseProblem<'a> {
     /// Combines data and a forward map; `trial` is set if the data were generated.
     pub fn new(data: &'a Kept<Data>, route: Route<'a>, trial: Option<Trial>) -> Self {
-        Self { data, route, trial, allowances: OnceLock::new(), best_fit: OnceLock::new() }
+        Self { data, route, trial, derived: Arc::default() }
+    }
+
+    /// The same problem with the results that others of the same data and map have computed.
+    pub fn sharing(self, derived: &Arc<Derived>) -> Self {
+        Self { derived: derived.clone(), ..self }
     }
 
     /// The forward map: the emulator, including the predicted numerical error, or the model itself.
@@ -101,16 +113,16 @@ impl<'a> InverseProblem<'a> {
     /// The same problem with a best fit that is known.
     pub fn with_best_fit(self, known: Option<&BestFit>) -> Self {
         let best_fit = known.map_or_else(OnceLock::new, |fitted| OnceLock::from(fitted.clone()));
-        Self { best_fit, ..self }
+        Self { derived: Arc::new(Derived { best_fit, ..Derived::default() }), ..self }
     }
 
     /// Least-squares best fit to these data.
     pub(super) fn best_fit(&self, study: &Study, data: &Observations) -> Result<&BestFit, Stop> {
-        if let Some(found) = self.best_fit.get() {
+        if let Some(found) = self.derived.best_fit.get() {
             return Ok(found);
         }
         let found = best_fit::fitted(study, data, self.forward())?;
-        Ok(self.best_fit.get_or_init(|| found))
+        Ok(self.derived.best_fit.get_or_init(|| found))
     }
 
     /// Errors of emulator and numerics that the study's likelihood includes, for these data.
@@ -120,7 +132,7 @@ impl<'a> InverseProblem<'a> {
         keys: &DiscrepancyKeys,
         data: &Observations,
     ) -> Result<&[Allowance], Stop> {
-        if let Some(found) = self.allowances.get() {
+        if let Some(found) = self.derived.allowances.get() {
             return Ok(found);
         }
         let (mut found, forward) = (Vec::new(), self.forward());
@@ -140,7 +152,7 @@ impl<'a> InverseProblem<'a> {
                 Fit { data, forward, point: &best.point },
             )?);
         }
-        Ok(self.allowances.get_or_init(|| found))
+        Ok(self.derived.allowances.get_or_init(|| found))
     }
 }
 

@@ -300,8 +300,9 @@ fn next(
         learned.numerics
     };
     let region = (refine.region == Region::Posterior).then_some(place);
-    let again = Emulated::new(study, data, (fitted, emulator), numerics, trial)?;
-    Ok((Emulated { region, ..again }, error))
+    let mut again = Emulated::new(study, data, (fitted, emulator), numerics, trial)?;
+    again.region = region;
+    Ok((again, error))
 }
 
 /// Returns true if the estimate of the numerical error is valid in the whole region.
