@@ -11,6 +11,7 @@ use lacuna::math::moments;
 use lacuna::run::Silent;
 use lacuna_engine::pipeline;
 use lacuna_engine::stage::calibrate::{self, Parts};
+use lacuna_engine::stage::inverse_problem::{InverseProblem, Route};
 use lacuna_engine::study::resolve;
 use lacuna_run::{RunDirectory, Stage};
 
@@ -124,7 +125,8 @@ fn calibrations(
         let data = Observations { blocks: vec![Measurements::new(layout, replicates)] };
         let measured = learned.data.value.measured.as_mut().unwrap();
         (measured.read, measured.used, measured.likelihood) = (data.clone(), data.clone(), data);
-        let known = learned.problem();
+        // What other data have told of the errors does not hold for these.
+        let known = InverseProblem::new(&learned.data, Route::Emulated(&learned), None);
         let parts = Parts::of(&study, known.data.value.measured.as_ref().unwrap(), &known).unwrap();
         let posterior = parts.posterior(&study, &known);
         let folder = Stage::Calibrate.part(&format!("truth-{i}"));
