@@ -16,7 +16,7 @@ use crate::study::Study;
 
 /// An emulator of the model with the runs that it was fitted to and the data that it is compared with.
 pub struct Emulated {
-    /// Runs and measurements.
+    /// Runs and measurements. Problems of this share what follows from them: other data need a problem of their own.
     pub data: Kept<Data>,
     /// Fitted surrogate with its errors.
     pub fitted: Kept<Fitted>,
