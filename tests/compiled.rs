@@ -186,7 +186,7 @@ fn an_exception_in_a_skeleton_in_cpp_is_told() {
     let body = "    LacunaRandom random = lacuna_random(key);\n";
     // The contract asks for points of one, three and four coordinates.
     let throws = "    if (dimension == 1) throw std::runtime_error(\"the cube is full\");\n    \
-                  if (dimension == 3) throw Rejected(\"another key would do\");\n    \
+                  if (dimension == 3) throw lacuna::Rejected(\"another key would do\");\n    \
                   if (dimension == 4) throw 7;\n";
     assert!(text.contains(body));
     fs::write(&file, text.replace(body, &format!("{throws}{body}"))).unwrap();

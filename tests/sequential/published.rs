@@ -119,7 +119,7 @@ pub fn draws(path: &Path, settings: &[&str], out: &Path) -> (Vec<Vec<f64>>, usiz
     let (emulated, kept) = pipeline::calibrate_emulated(&study, &mut run, &Silent).unwrap();
     let calibrated = kept.unwrap().value;
     let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
-    let runs = emulated.data.value.runs().unwrap();
+    let runs = emulated.data().value.runs().unwrap();
     let columns = (0..study.parameters.len()).map(|j| draws.pooled(j)).collect();
     (columns, runs.runs.len() + runs.failed.len())
 }

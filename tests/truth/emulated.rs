@@ -115,7 +115,7 @@ fn calibrations(
     let complaints = checked.complaints();
     let study = checked.study.expect(&complaints);
     let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
-    let (mut learned, _) = pipeline::calibrate_emulated(&study, &mut run, &Silent).unwrap();
+    let (learned, _) = pipeline::calibrate_emulated(&study, &mut run, &Silent).unwrap();
     let mut found = Found { held: Default::default(), widths: Vec::new() };
     for i in 0..truths {
         let truth = [random.uniform(), random.uniform(), random.uniform()];
@@ -123,10 +123,10 @@ fn calibrations(
         let replicates = vec![Replicate::new("1", values)];
         let layout = study.layouts.blocks[0].clone();
         let data = Observations { blocks: vec![Measurements::new(layout, replicates)] };
-        let measured = learned.data.value.measured.as_mut().unwrap();
+        let mut own = learned.data().clone();
+        let measured = own.value.measured.as_mut().unwrap();
         (measured.read, measured.used, measured.likelihood) = (data.clone(), data.clone(), data);
-        // What other data have told of the errors does not hold for these.
-        let known = InverseProblem::new(&learned.data, Route::Emulated(&learned), None);
+        let known = InverseProblem::new(&own, Route::Emulated(&learned), None);
         let parts = Parts::of(&study, known.data.value.measured.as_ref().unwrap(), &known).unwrap();
         let posterior = parts.posterior(&study, &known);
         let folder = Stage::Calibrate.part(&format!("truth-{i}"));

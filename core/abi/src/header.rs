@@ -28,7 +28,9 @@ pub fn header() -> String {
         text.push_str(helpers);
         text.push('\n');
     }
-    text.push_str(CLOSE);
+    for end in [CLOSE, IN_CPP, END_OF_FILE] {
+        text.push_str(end);
+    }
     text
 }
 
@@ -98,8 +100,12 @@ const CLOSE: &str = r"#ifdef __cplusplus
 }
 #endif
 
-#endif
 ";
+
+/// Functions for the authors of plugins in C++.
+const IN_CPP: &str = include_str!("header/cpp.h");
+
+const END_OF_FILE: &str = "\n#endif\n";
 
 /// The longest line of a comment.
 const WIDTH: usize = 116;

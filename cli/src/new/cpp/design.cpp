@@ -15,39 +15,9 @@
 
 namespace {
 
-/* What the program may try again with something else. */
-struct Rejected : std::runtime_error {
-    using std::runtime_error::runtime_error;
-};
-
-/* Appends to the text of an answer. */
-int32_t say(const LacunaAnswer *answer, std::string_view text, int32_t status = LACUNA_OK)
-{
-    lacuna_say(answer, text.data(), text.size());
-    return status;
-}
-
-/* Runs a function behind the boundary. Nothing may unwind into the program: an exception becomes the text of a status. */
-template <class Act>
-int32_t guard(const LacunaAnswer *answer, Act act) noexcept
-{
-    try {
-        act();
-        return LACUNA_OK;
-    } catch (const Rejected &reason) {
-        return say(answer, reason.what(), LACUNA_REJECTED);
-    } catch (const std::exception &error) {
-        return say(answer, error.what(), LACUNA_STOP);
-    } catch (...) {
-        return say(answer, "an exception of an unknown type", LACUNA_STOP);
-    }
-}
-
-Rejected wrong_option(const std::string &key, const std::string &expected)
-{
-    return Rejected(R"([{"at":")" + key + R"(","message":"wrong value for `)" + key + R"(`","expected":")" + expected +
-                    "\"}]");
-}
+using lacuna::guard;
+using lacuna::say;
+using lacuna::wrong_option;
 
 /* ---- the options ---- */
 

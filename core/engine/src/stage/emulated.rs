@@ -16,8 +16,8 @@ use crate::study::Study;
 
 /// An emulator of the model with the runs that it was fitted to and the data that it is compared with.
 pub struct Emulated {
-    /// Runs and measurements. Problems of this share what follows from them: other data need a problem of their own.
-    pub data: Kept<Data>,
+    /// Runs and measurements. They stay as they are, because the problems made of this share what follows from them.
+    pub(crate) data: Kept<Data>,
     /// Fitted surrogate with its errors.
     pub fitted: Kept<Fitted>,
     /// Numerical error of the model, if the study requests it.
@@ -73,6 +73,11 @@ impl Emulated {
             trial,
             derived,
         })
+    }
+
+    /// Runs and measurements. Other measurements need a problem of their own, by [`InverseProblem::new`].
+    pub fn data(&self) -> &Kept<Data> {
+        &self.data
     }
 
     /// The emulator, including the predicted numerical error.
