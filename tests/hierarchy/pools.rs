@@ -207,11 +207,17 @@ fn populations_that_cannot_be_are_refused() {
             Err(stop) => stop.to_string(),
         }
     };
-    let unknown = said(VARIANCES_STUDY.replace("{ variance = {", "{ varience = {"));
+    // A name that is almost an option is told before anything is computed, with its line.
+    let path = folder.path().join("study.toml");
+    fs::write(&path, VARIANCES_STUDY.replace("{ variance = {", "{ varience = {")).unwrap();
+    let checked = lacuna_engine::study::resolve::load(&path, &[]).complaints();
     assert!(
-        unknown.contains("`varience`") && unknown.contains("did you mean `variance`?"),
-        "{unknown}"
+        checked.contains("study.toml:") && checked.contains("no unknown `varience`"),
+        "{checked}"
     );
+    assert!(checked.contains("did you mean `variance`?"), "{checked}");
+    let unknown = said(VARIANCES_STUDY.replace("{ variance = {", "{ stiffness = {"));
+    assert!(unknown.contains("`stiffness`, which is none of its unknowns"), "{unknown}");
     let alone = said(VARIANCES_STUDY.replace("by = \"sensor\"\n", ""));
     assert!(alone.contains("not two groups with data") && alone.contains("add `by`"), "{alone}");
     let normal = said(VARIANCES_STUDY.replace("log_normal = {", "normal = {"));

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use lacuna::plugin::Context;
 use lacuna::text::nearest::nearest;
@@ -58,7 +58,7 @@ pub fn files(model: &External, context: &Context<'_>, complaints: &mut Complaint
     program(model, context, complaints);
     let mut read = Some(BTreeSet::new());
     for (i, template) in model.templates.iter().enumerate() {
-        let path = context.directory.join(&template.from);
+        let path = beside(context, &template.from);
         let spot = format!("templates.{i}.from");
         let used = template_file(&path, &spot, context, complaints);
         read = read.zip(used).map(|(all, used)| all.union(&used).cloned().collect());
@@ -68,7 +68,7 @@ pub fn files(model: &External, context: &Context<'_>, complaints: &mut Complaint
     }
     for (key, paths) in [("copy", &model.copy), ("link", &model.link)] {
         for (i, path) in paths.iter().enumerate() {
-            let path = context.directory.join(path);
+            let path = beside(context, path);
             if !path.exists() {
                 let text = format!("there is no file `{}`", path.display());
                 complaints.at(&format!("{key}.{i}")).say(text);
@@ -213,6 +213,11 @@ fn places(model: &External, complaints: &mut Complaints<'_>) {
     }
 }
 
+/// A path of the study as messages name it: `./solver` and not `././solver` for a study in the current directory.
+fn beside(context: &Context<'_>, path: &Path) -> PathBuf {
+    context.directory.join(path).components().collect()
+}
+
 fn outside(spot: &str, path: &Path, complaints: &mut Complaints<'_>) {
     complaints
         .at(spot)
@@ -231,7 +236,7 @@ fn program(model: &External, context: &Context<'_>, complaints: &mut Complaints<
     }
     let spot = complaints.at("command.0");
     if Path::new(&name).components().count() > 1 {
-        let path = context.directory.join(&name);
+        let path = beside(context, Path::new(&name));
         if path.is_file() {
             spot.say(format!("`{}` is not an executable file", path.display()));
         } else {

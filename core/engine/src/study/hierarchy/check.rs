@@ -88,10 +88,21 @@ fn scatter(path: &str, keys: &ScatterKeys, complaints: &mut Complaints<'_>) {
     positive(&format!("{path}.{}.{spread}", keys.name()), scale, complaints);
 }
 
-/// Reports populations of the discrepancy's unknowns that cannot be.
+/// Reports populations of the discrepancy's unknowns that cannot be. Its unknowns are known only with the data, but most are
+/// options that were given a prior: a name that is almost one of these is a mistake.
 fn of_discrepancy(study: &Study, complaints: &mut Complaints<'_>) {
-    for (name, keys) in study.discrepancy.iter().flat_map(|d| &d.common.population) {
-        scatter(&format!("discrepancy.population.{name}"), keys, complaints);
+    let Some(section) = &study.discrepancy else { return };
+    let options = &section.built.options;
+    for (name, keys) in &section.common.population {
+        let path = format!("discrepancy.population.{name}");
+        let near = nearest(name, options.keys().map(String::as_str));
+        if let (false, Some(near)) = (options.contains_key(name), near) {
+            complaints
+                .at(&path)
+                .say(format!("the discrepancy has no unknown `{name}`"))
+                .help(format!("did you mean `{near}`?"));
+        }
+        scatter(&path, keys, complaints);
     }
 }
 
