@@ -1,6 +1,7 @@
 //! Contract of discrepancies.
 
 mod draws;
+mod parts;
 
 use std::sync::OnceLock;
 
@@ -17,6 +18,7 @@ use self::draws::{
     draws_errors_given_the_data, draws_the_errors_it_predicts, has_the_law_that_it_simulates,
     simulates_what_it_predicts,
 };
+use self::parts::stands_for_parts;
 use crate::judge::{Check, agree, calm, judge, layout, refused, slope, twice};
 
 /// Tests a discrepancy against its contract, on five replicates of ten outputs with missing values, one output never
@@ -27,7 +29,8 @@ use crate::judge::{Check, agree, calm, judge, layout, refused, slope, twice};
 ///   never a number for invalid hyperparameters.
 /// - Its derivatives agree with finite differences, and are zero by outputs that were not measured.
 /// - The density of a value given all others, if implemented, is the quotient of the likelihoods with and without the
-///   value; and of those of all data and of the part without it, if that form is implemented.
+///   value; and of those of all data and of the part without it, if that form is implemented. A likelihood that gives that of
+///   a part itself gives the same values and derivatives.
 /// - Reduced to a linear emulator it is the same function, with the same derivatives.
 /// - Simulated data have the missing values of the measurements, and the variance predicted for a new replicate, within
 ///   five Monte Carlo errors.
@@ -218,43 +221,6 @@ fn leaves_values_out(discrepancy: &dyn Discrepancy) -> Result<(), String> {
         }
     }
     agree("the density of value", &densities, &quotients, 1e-8)
-}
-
-/// The likelihood of a part of the data uses the distribution of all data, whatever the discrepancy estimates from
-/// them.
-fn stands_for_parts(discrepancy: &dyn Discrepancy) -> Result<(), String> {
-    let (data, truth, errors) = (data(), truth(), [common("emulator", true)]);
-    let known = known(&data, &errors);
-    let refused = |stop: Stop| format!("sound data are refused: {stop}");
-    let whole = discrepancy.likelihood(&known).map_err(refused)?;
-    let hyper = start(&*whole);
-    let of = |part: &dyn Likelihood| {
-        let all = whole.hyperparameters();
-        let own = part.hyperparameters().iter().map(|own| {
-            all.iter().position(|other| other.name == own.name).map_or(f64::NAN, |i| hyper[i])
-        });
-        part.log_likelihood(&truth, &own.collect::<Vec<_>>())
-    };
-    let Some(same) = discrepancy.likelihood_of_part(&known, &data).map_err(refused)? else {
-        return Ok(());
-    };
-    agree("the likelihood of all data as a part", &[of(&*same)], &[of(&*whole)], 1e-12)?;
-    let Some(given) = whole.left_out(&truth, &hyper) else { return Ok(()) };
-    let (mut densities, mut quotients) = (Vec::new(), Vec::new());
-    let mut next = given.iter();
-    for (r, replicate) in data.replicates.iter().enumerate() {
-        for i in (0..OUTPUTS).filter(|&i| replicate.values[i].is_some()) {
-            let density = next.next().copied().unwrap_or(f64::NAN);
-            let mut less = data.clone();
-            less.replicates[r].values[i] = None;
-            let part = discrepancy.likelihood_of_part(&known, &less).map_err(refused)?;
-            if let Some(part) = part {
-                densities.push(density);
-                quotients.push(of(&*whole) - of(&*part));
-            }
-        }
-    }
-    agree("the density of a value", &densities, &quotients, 1e-8)
 }
 
 /// Coefficients of four terms whose basis functions are the coordinates themselves.

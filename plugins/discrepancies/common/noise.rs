@@ -5,7 +5,7 @@ use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::discrepancy::{CommonError, ErrorPath, Hyperparameter, Known, VariancePart};
 use lacuna::run::Stop;
 
-use super::{By, Groups, PerGroup, Replicates, Unknown, Variance, squared};
+use super::{By, Groups, Normal, PerGroup, Replicates, Unknown, Variance, squared};
 
 /// The data of a study and the errors common to all replicates, from which replicates are predicted and simulated.
 #[derive(Debug, Clone)]
@@ -71,6 +71,19 @@ impl Noise {
         })
     }
 
+    /// The noise of a part of the data in which no output is missing altogether.
+    pub fn of_part(&self, part: &Measurements, replicates: &Replicates) -> Self {
+        let common = self.setting.common.clone();
+        let setting = Setting::with(part, common, replicates, &self.groups);
+        Self { setting, ..self.clone() }
+    }
+
+    /// The density of the data output by output; `None` if it cannot be computed.
+    pub fn normal(&self) -> Option<Normal> {
+        let Setting { data, common, .. } = &self.setting;
+        Normal::new(&Replicates::of(data, common).ok()?, common).ok()
+    }
+
     /// Returns the variance of each output, given those of the groups.
     pub fn by_output(&self, groups: &[f64]) -> Vec<f64> {
         self.groups.spread(groups).iter().zip(&self.scale).map(|(v, s)| v * s).collect()
@@ -93,15 +106,21 @@ impl Noise {
 impl Setting {
     /// Builds the setting; variances between replicates are pooled over these groups.
     pub fn new(known: &Known<'_>, replicates: &Replicates, groups: &Groups) -> Self {
-        Self {
-            data: known.data.clone(),
-            common: known.common.to_vec(),
-            replicated: if known.data.states_noise() {
-                Some(known.data.stated_sd().iter().map(|sd| sd * sd).collect())
-            } else {
-                Pooled::of(groups, replicates).by_output(groups)
-            },
-        }
+        Self::with(known.data, known.common.to_vec(), replicates, groups)
+    }
+
+    fn with(
+        data: &Measurements,
+        common: Vec<CommonError>,
+        replicates: &Replicates,
+        groups: &Groups,
+    ) -> Self {
+        let replicated = if data.states_noise() {
+            Some(data.stated_sd().iter().map(|sd| sd * sd).collect())
+        } else {
+            Pooled::of(groups, replicates).by_output(groups)
+        };
+        Self { data: data.clone(), common, replicated }
     }
 
     /// Splits the variance of a new replicate into parts: `measurement`, up to the variance that replicates show;

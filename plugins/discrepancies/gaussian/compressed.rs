@@ -57,8 +57,8 @@ impl CompressedGroup {
                 -s.weighted_mean[i]
             }
         });
-        let along = lacuna_linalg::multiply(&s.directions, &b);
-        let explained = lacuna_linalg::transposed_multiply(&s.directions, &along);
+        let along = lacuna_linalg::multiply(&s.common.rows, &b);
+        let explained = lacuna_linalg::transposed_multiply(&s.common.rows, &along);
         for (entry, part) in b.as_mut_slice().iter_mut().zip(explained.as_slice()) {
             *entry -= part;
         }

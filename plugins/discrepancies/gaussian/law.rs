@@ -1,5 +1,7 @@
 //! Treatment of the groups' variances: given, integrated out, or given and coupled by common errors.
 
+use std::sync::Arc;
+
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::discrepancy::CommonError;
 use lacuna::run::Stop;
@@ -8,7 +10,7 @@ use lacuna_linalg::{Cholesky, Matrix};
 
 use super::grams::Grams;
 use super::integral::{Integral, conjugate, integrate};
-use super::statistics::{Residual, Spread, Statistics};
+use super::statistics::{Directions, Residual, Spread, Statistics};
 use crate::discrepancies::common::PerGroup;
 
 /// Treatment of the groups' variances (see the module).
@@ -28,6 +30,8 @@ pub(super) enum Law {
 #[derive(Debug, Clone)]
 pub(super) struct Coupled {
     variance: PerGroup,
+    /// `T_g` over `sqrt(n)`, as in [`statistics`](super::statistics), of each group.
+    shares: Arc<Vec<Matrix>>,
     /// `T_g` of each group.
     factors: Vec<Matrix>,
     grams: Grams,
@@ -44,6 +48,14 @@ pub(super) struct Slopes {
 }
 
 impl Law {
+    /// The treatment of a part of the data whose groups have the same directions.
+    pub fn of_part(&self, groups: &[Statistics]) -> Self {
+        match self {
+            Self::Coupled(coupled) => Self::Coupled(coupled.of_part(groups)),
+            alone => alone.clone(),
+        }
+    }
+
     /// Returns the log-likelihood; minus infinity if a variance is not above zero.
     pub fn log_likelihood(
         &self,
@@ -173,14 +185,27 @@ impl Coupled {
         let svd = lacuna_linalg::thin_svd(&all).map_err(failed)?;
         let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
         let turn = svd.v.select_columns(&(0..rank).collect::<Vec<_>>());
-        let mut factors = Vec::new();
+        let mut shares = Vec::new();
         for (group, weighted) in groups.iter_mut().zip(&weighted) {
             let qr = lacuna_linalg::thin_qr(&lacuna_linalg::multiply(weighted, &turn))
                 .map_err(failed)?;
-            group.directions = qr.q.transposed();
-            factors.push(qr.r);
+            group.common = Arc::new(Directions { rows: qr.q.transposed(), sizes: Vec::new() });
+            shares.push(qr.r);
         }
-        Ok(Self { variance, grams: Grams::of(&factors), factors })
+        Ok(Self::of(variance, Arc::new(shares), groups))
+    }
+
+    fn of(variance: PerGroup, shares: Arc<Vec<Matrix>>, groups: &[Statistics]) -> Self {
+        let scaled = |(share, group): (&Matrix, &Statistics)| {
+            Matrix::from_fn(share.rows(), share.columns(), |i, k| group.root * share[(i, k)])
+        };
+        let factors: Vec<Matrix> = shares.iter().zip(groups).map(scaled).collect();
+        Self { variance, shares, grams: Grams::of(&factors), factors }
+    }
+
+    /// The coupling of a part of the data whose groups have the same directions.
+    pub fn of_part(&self, groups: &[Statistics]) -> Self {
+        Self::of(self.variance.clone(), Arc::clone(&self.shares), groups)
     }
 
     fn solve<'a>(&'a self, hyper: &'a [f64], residuals: &[Residual<'_>]) -> Option<Solved<'a>> {

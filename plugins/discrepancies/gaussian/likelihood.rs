@@ -1,5 +1,7 @@
 //! Likelihood in the sufficient statistics of the replicates.
 
+use std::sync::OnceLock;
+
 use lacuna::data::Measurements;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::Fact;
@@ -23,8 +25,8 @@ pub(super) struct GaussianLikelihood {
     noise: Noise,
     pub(super) groups: Vec<Statistics>,
     pub(super) law: Law,
-    /// Density output by output, if common errors couple the groups.
-    normal: Option<Normal>,
+    /// Density output by output, if common errors couple the groups; made when it is asked for.
+    normal: OnceLock<Option<Normal>>,
 }
 
 /// Residual of each group: components along the directions, and the remaining vector.
@@ -68,8 +70,15 @@ impl GaussianLikelihood {
             }
             _ => Law::Given(noise.variance.clone()),
         };
-        let normal = coupled.then(|| Normal::new(&replicates, common)).transpose()?;
-        Ok(Self { hyper, noise, groups, law, normal })
+        Ok(Self { hyper, noise, groups, law, normal: OnceLock::new() })
+    }
+
+    /// Density output by output, if common errors couple the groups.
+    fn normal(&self) -> Option<&Normal> {
+        match &self.law {
+            Law::Coupled(_) => self.normal.get_or_init(|| self.noise.normal()).as_ref(),
+            _ => None,
+        }
     }
 
     #[cfg(test)]
@@ -106,7 +115,7 @@ impl GaussianLikelihood {
             Matrix::from_fn(nodes.len(), values.len(), |n, r| values[r] / (nodes[n].0 + values[r]));
         let pulled =
             Matrix::from_fn(share.rows(), share.columns(), |n, r| share[(n, r)] * along[r]);
-        let directions = &group.directions;
+        let directions = &group.common.rows;
         let squares = Matrix::from_fn(directions.rows(), directions.columns(), |r, k| {
             directions[(r, k)] * directions[(r, k)]
         });
@@ -161,6 +170,21 @@ impl Likelihood for GaussianLikelihood {
         self.law.log_likelihood(&self.spreads(), hyper, &residuals(&split))
     }
 
+    /// The directions of the common errors are those of all data if every output lost the same share of its replicates.
+    fn of_part(&self, part: &Measurements) -> Option<Box<dyn Likelihood>> {
+        let replicates = Replicates::of(part, &[]).ok()?;
+        let scale = &self.noise.scale;
+        let groups = self.groups.iter().map(|g| g.of_part(&replicates, scale));
+        let groups = groups.collect::<Option<Vec<Statistics>>>()?;
+        Some(Box::new(Self {
+            hyper: self.hyper.clone(),
+            law: self.law.of_part(&groups),
+            noise: self.noise.of_part(part, &replicates),
+            groups,
+            normal: OnceLock::new(),
+        }))
+    }
+
     fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let split = self.split(response);
         let mut by_response = vec![0.0; response.len()];
@@ -169,7 +193,7 @@ impl Likelihood for GaussianLikelihood {
         };
         for (g, (group, (_, outside))) in self.groups.iter().zip(&split).enumerate() {
             let mut pull: Vec<f64> = outside.iter().map(|z| z / slopes.outside[g]).collect();
-            for (direction, a) in group.directions.iter_rows().zip(&slopes.along[g]) {
+            for (direction, a) in group.common.rows.iter_rows().zip(&slopes.along[g]) {
                 for (p, u) in pull.iter_mut().zip(direction) {
                     *p += u * a;
                 }
@@ -183,7 +207,7 @@ impl Likelihood for GaussianLikelihood {
 
     fn left_out(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<f64>> {
         let data = &self.noise.setting.data;
-        if let (Some(normal), Law::Coupled(_)) = (&self.normal, &self.law) {
+        if let Some(normal) = self.normal() {
             let groups = self.noise.variance.values(hyper)?;
             let variance = self.noise.by_measured(&normal.replicates, groups);
             let solved = normal.solve(response, &variance)?;
@@ -207,7 +231,7 @@ impl Likelihood for GaussianLikelihood {
     }
 
     fn is_cheap(&self) -> bool {
-        self.normal.is_none()
+        !matches!(self.law, Law::Coupled(_))
     }
 
     fn compress(&self, linear: &dyn Linear) -> Option<Box<dyn Compressed>> {
@@ -240,9 +264,9 @@ impl Likelihood for GaussianLikelihood {
     }
 
     fn facts(&self) -> Vec<Fact> {
-        let directions: usize = match &self.normal {
+        let directions: usize = match self.normal() {
             Some(normal) => normal.factor.columns(),
-            None => self.groups.iter().map(|g| g.directions.rows()).sum(),
+            None => self.groups.iter().map(|g| g.common.rows.rows()).sum(),
         };
         vec![
             Fact::new("data", self.groups.iter().map(|g| g.spread.count).sum::<f64>()),

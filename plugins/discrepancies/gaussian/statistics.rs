@@ -8,8 +8,12 @@
 //! ```
 //!
 //! where `K = W F F' W`, `W = diag(sqrt(n_i))`, is the covariance `F F'` of the common errors as it enters `z`. The
-//! thin singular value decomposition `W F = U diag(s) V'` diagonalises `K` once for all `v`. If the variance is a
-//! multiple of a known one, all of these are statistics of the data divided by its root.
+//! thin singular value decomposition `W F / sqrt(n) = U diag(s) V'`, with `n` the largest of all `n_i`, diagonalises `K` once
+//! for all `v`. It is that of every part of the data in which all `n_i` are smaller by the same factor, such as the data
+//! without one of the replicates. If the variance is a multiple of a known one, all of these are statistics of the data
+//! divided by its root.
+
+use std::sync::Arc;
 
 use lacuna::plugin::discrepancy::CommonError;
 use lacuna::run::Stop;
@@ -25,12 +29,32 @@ pub(super) struct Statistics {
     pub measured: Vec<usize>,
     /// `sqrt(n_i)` of each output over the root of its scale.
     pub weight: Vec<f64>,
+    /// `weight / sqrt(n)` of each output: the weights that parts of the data may have in common.
+    share: Vec<f64>,
+    /// `sqrt(n)`.
+    pub root: f64,
     /// Weight times `ybar_i` of each output.
     pub weighted_mean: Vec<f64>,
     /// Statistics that do not depend on the response.
     pub spread: Spread,
-    /// `U'`: directions of the common errors (`rank x measured`).
-    pub directions: Matrix,
+    /// Directions of the common errors.
+    pub common: Arc<Directions>,
+}
+
+/// Directions of the common errors of a group.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Directions {
+    /// `U'` (`rank x measured`).
+    pub rows: Matrix,
+    /// `s`; empty if the common errors couple several groups.
+    pub sizes: Vec<f64>,
+}
+
+impl Directions {
+    /// No directions among some outputs.
+    fn none(measured: usize) -> Self {
+        Self { rows: Matrix::zeros(0, measured), sizes: Vec::new() }
+    }
 }
 
 /// Statistics that do not depend on the response.
@@ -113,12 +137,24 @@ impl Statistics {
         scale: &[f64],
         chosen: impl Fn(usize) -> bool,
     ) -> Result<Self, Stop> {
-        let mut statistics = Self::without_common(replicates, scale, chosen);
-        let (directions, eigenvalues) =
-            common_directions(common, &statistics.measured, &statistics.weight)?;
-        statistics.directions = directions;
-        statistics.spread.eigenvalues = eigenvalues;
-        Ok(statistics)
+        let statistics = Self::without_common(replicates, scale, chosen);
+        let common = Arc::new(statistics.common_directions(common)?);
+        Ok(statistics.along(common))
+    }
+
+    /// Sets the directions of the common errors.
+    pub fn along(mut self, common: Arc<Directions>) -> Self {
+        self.spread.eigenvalues = common.sizes.iter().map(|s| (s * self.root).powi(2)).collect();
+        self.common = common;
+        self
+    }
+
+    /// The statistics of a part of the data with the same directions; `None` if it has others.
+    pub fn of_part(&self, replicates: &Replicates, scale: &[f64]) -> Option<Self> {
+        let own = |i: usize| self.measured.binary_search(&i).is_ok();
+        let part = Self::without_common(replicates, scale, own);
+        let same = part.measured == self.measured && part.share == self.share;
+        same.then(|| part.along(Arc::clone(&self.common)))
     }
 
     /// Like [`Statistics::of`], without common errors.
@@ -132,6 +168,7 @@ impl Statistics {
         let scales = || kept.iter().map(|&k| scale[r.measured[k]]);
         let counts = || kept.iter().map(|&k| r.count[k]);
         let weight: Vec<f64> = counts().zip(scales()).map(|(n, s)| n.sqrt() / s.sqrt()).collect();
+        let root = r.count.iter().copied().fold(0.0, f64::max).sqrt();
         let spread = Spread {
             count: counts().sum(),
             scatter: kept.iter().zip(scales()).map(|(&k, s)| r.scatter[k] / s).sum(),
@@ -141,59 +178,55 @@ impl Statistics {
         Self {
             measured: kept.iter().map(|&k| r.measured[k]).collect(),
             weighted_mean: kept.iter().zip(&weight).map(|(&k, w)| w * r.mean[k]).collect(),
-            directions: Matrix::zeros(0, kept.len()),
+            share: counts().zip(scales()).map(|(n, s)| n.sqrt() / root / s.sqrt()).collect(),
+            root,
+            common: Arc::new(Directions::none(kept.len())),
             weight,
             spread,
         }
     }
 
-    /// Returns the factor of the common errors as it enters the residual (`measured x columns`).
+    /// Returns the factor of the common errors as it enters the residual, over `sqrt(n)` (`measured x columns`).
     pub fn weighted(&self, common: &[CommonError]) -> Matrix {
-        weighted_factor(common, &self.measured, &self.weight)
+        let columns: Vec<(&Matrix, usize)> = common
+            .iter()
+            .flat_map(|error| (0..error.factor.columns()).map(move |k| (&error.factor, k)))
+            .collect();
+        Matrix::from_fn(self.measured.len(), columns.len(), |i, k| {
+            let (factor, column) = columns[k];
+            self.share[i] * factor[(self.measured[i], column)]
+        })
+    }
+
+    /// Returns the directions of the common errors, by their sizes.
+    fn common_directions(&self, common: &[CommonError]) -> Result<Directions, Stop> {
+        let weighted = self.weighted(common);
+        if weighted.columns() == 0 {
+            return Ok(Directions::none(self.measured.len()));
+        }
+        let svd = lacuna_linalg::thin_svd(&weighted)
+            .map_err(|e| Stop::new(format!("the covariance of the common errors: {e}")))?;
+        let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
+        let kept: Vec<usize> = (0..rank).collect();
+        Ok(Directions {
+            rows: svd.u.select_columns(&kept).transposed(),
+            sizes: svd.values[..rank].to_vec(),
+        })
     }
 
     /// Returns the residual along the directions of the common errors, and the remaining vector.
     pub fn split(&self, response: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let outputs = self.measured.iter().zip(&self.weight).zip(&self.weighted_mean);
         let mut outside: Vec<f64> = outputs.map(|((&i, w), mean)| mean - w * response[i]).collect();
-        let mut along = Vec::with_capacity(self.directions.rows());
-        for direction in self.directions.iter_rows() {
+        let mut along = Vec::with_capacity(self.common.rows.rows());
+        for direction in self.common.rows.iter_rows() {
             along.push(dot(direction, &outside));
         }
-        for (direction, &a) in self.directions.iter_rows().zip(&along) {
+        for (direction, &a) in self.common.rows.iter_rows().zip(&along) {
             for (z, u) in outside.iter_mut().zip(direction) {
                 *z -= a * u;
             }
         }
         (along, outside)
     }
-}
-
-fn weighted_factor(common: &[CommonError], measured: &[usize], weight: &[f64]) -> Matrix {
-    let columns: Vec<(&Matrix, usize)> = common
-        .iter()
-        .flat_map(|error| (0..error.factor.columns()).map(move |k| (&error.factor, k)))
-        .collect();
-    Matrix::from_fn(measured.len(), columns.len(), |i, k| {
-        let (factor, column) = columns[k];
-        weight[i] * factor[(measured[i], column)]
-    })
-}
-
-/// Returns eigenvectors (as rows) and eigenvalues of the covariance `K` of all common errors.
-fn common_directions(
-    common: &[CommonError],
-    measured: &[usize],
-    weight: &[f64],
-) -> Result<(Matrix, Vec<f64>), Stop> {
-    let weighted = weighted_factor(common, measured, weight);
-    if weighted.columns() == 0 {
-        return Ok((Matrix::zeros(0, measured.len()), Vec::new()));
-    }
-    let svd = lacuna_linalg::thin_svd(&weighted)
-        .map_err(|e| Stop::new(format!("the covariance of the common errors: {e}")))?;
-    let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
-    let kept: Vec<usize> = (0..rank).collect();
-    let directions = svd.u.select_columns(&kept).transposed();
-    Ok((directions, svd.values[..rank].iter().map(|s| s * s).collect()))
 }

@@ -120,17 +120,21 @@ pub fn left_out(
         responses.par_iter().enumerate().map(one).collect()
     };
     for (block, measured) in data.blocks.iter().enumerate() {
-        let Some(whole) = law.part(block, measured)? else { return Ok(None) };
-        let whole = values(block, &*whole);
+        let Some(all) = law.part(block, measured)? else { return Ok(None) };
+        let whole = values(block, &*all);
         let own: Vec<usize> = (0..curves.len()).filter(|&c| curves[c].block == block).collect();
-        // Each likelihood factors the covariance of its data anew, which takes most of the time.
+        // A likelihood that is made anew factors the covariance of its data, which takes most of the time.
         let of_the_rest = |&c: &usize| -> Result<Option<Vec<f64>>, Stop> {
             let rest = without(measured, &curves[c]);
             // Without other data the conditional density is that of the curve itself.
             if rest.count() == 0 {
                 return Ok(Some(vec![0.0; whole.len()]));
             }
-            Ok(law.part(block, &rest)?.map(|part| values(block, &*part)))
+            let part = match all.of_part(&rest) {
+                None => law.part(block, &rest)?,
+                known => known,
+            };
+            Ok(part.map(|part| values(block, &*part)))
         };
         let rests: Option<Vec<Vec<f64>>> =
             own.par_iter().map(of_the_rest).collect::<Result<_, Stop>>()?;
