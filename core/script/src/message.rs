@@ -66,15 +66,19 @@ pub fn write(
     let mut all = serde_json::to_vec(&line)?;
     all.push(b'\n');
     for matrix in matrices {
-        let start = all.len();
-        all.resize(start + 8 * matrix.as_slice().len(), 0);
-        let (places, _) = all[start..].as_chunks_mut::<8>();
-        places.iter_mut().zip(matrix.as_slice()).for_each(|(place, x)| *place = x.to_le_bytes());
+        for part in matrix.as_slice().chunks(AT_A_TIME) {
+            all.extend(part.iter().flat_map(|x| x.to_le_bytes()));
+            to.write_all(&all)?;
+            all.clear();
+        }
     }
-    all.extend_from_slice(bytes);
     to.write_all(&all)?;
+    to.write_all(bytes)?;
     to.flush()
 }
+
+/// Numbers written at a time: the other side reads them while the next ones are made.
+const AT_A_TIME: usize = 1 << 13;
 
 #[cfg(test)]
 mod tests {

@@ -73,6 +73,8 @@ impl Worker {
         else {
             return Err(format!("`{shown}` has no pipes"));
         };
+        widen(&requests);
+        widen(&output);
         let (answers, printed) = (BufReader::new(output), Printed::of(errors));
         let objects = BTreeSet::new();
         let mut worker = Self { process, requests, answers, printed, objects };
@@ -99,3 +101,13 @@ impl Worker {
         let _ = message::write(&mut self.requests, head, matrices, bytes);
     }
 }
+
+/// Lets a pipe hold a million bytes, so that the numbers of many points cross without a change of the process for every 64 kB;
+/// where the system refuses, it keeps its size.
+#[cfg(target_os = "linux")]
+fn widen(pipe: &impl std::os::fd::AsFd) {
+    let _ = rustix::pipe::fcntl_setpipe_size(pipe, 1 << 20);
+}
+
+#[cfg(not(target_os = "linux"))]
+fn widen<P>(_pipe: &P) {}
