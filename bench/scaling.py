@@ -1,12 +1,13 @@
 """Time and memory of whole runs against their size: runs, outputs, parameters, walkers, measured points.
 
-    cargo build --release && python3 bench/scaling.py [AXIS | AXIS=SIZE ...]
+    cargo build --release && python3 bench/scaling.py [AXIS | AXIS=SIZE | cores ...]
 
 Writes one line for each size: wall time, peak memory of the process, memory of the largest table, and the exponent of
 the time between this size and the one before (1: proportional). The simulator is a formula, so that the time is that of
-Lacuna.
+Lacuna. `cores` runs the founding study with one thread and with two, and writes the time of each stage.
 """
 
+import json
 import math
 import os
 import pathlib
@@ -113,7 +114,28 @@ AXES = {
 SIZES = {"runs": "runs", "outputs": "outputs", "parameters": "parameters", "walkers": "walkers", "points": "replicates"}
 
 
+def cores():
+    """Seconds of each stage of the founding study with one thread and with two, for stages of more than 2 s."""
+    seconds = {}
+    for threads in (1, 2):
+        with tempfile.TemporaryDirectory() as out:
+            command = [LACUNA, "--threads", str(threads), "run", "configs/sns/focused.toml", "--out", out]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            for stage in json.loads((pathlib.Path(out) / "manifest.json").read_text())["stages"]:
+                seconds.setdefault(stage["stage"], []).append(stage["seconds"])
+    print("| stage | one thread [s] | two threads [s] | ratio |")
+    print("|---|---|---|---|")
+    for stage, (one, two) in seconds.items():
+        if one > 2.0:
+            print(f"| {stage} | {one:.1f} | {two:.1f} | {one / two:.2f} |")
+
+
 def main():
+    if "cores" in sys.argv[1:]:
+        sys.argv.remove("cores")
+        cores()
+        if len(sys.argv) == 1:
+            return
     for wanted in sys.argv[1:] or AXES:
         axis, _, only = wanted.partition("=")
         print(f"| {axis} | wall time [s] | peak memory [MiB] | table of runs [MiB] | exponent of the time |")
