@@ -12,7 +12,8 @@ use super::{By, Groups, Normal, PerGroup, Replicates, Unknown, Variance, squared
 pub struct Setting {
     /// Measurements of the study.
     pub data: Measurements,
-    common: Vec<CommonError>,
+    /// Errors common to all replicates.
+    pub common: Vec<CommonError>,
     /// Variance of each output stated by the data, or else the variance between replicates pooled over its group;
     /// `None` without either.
     replicated: Option<Vec<f64>>,

@@ -1,6 +1,6 @@
 //! Likelihood in the sufficient statistics of the replicates.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use lacuna::data::Measurements;
 use lacuna::math::random::{Stream, uniform};
@@ -16,7 +16,8 @@ use lacuna_linalg::vector::dot;
 use super::Gaussian;
 use super::compressed::CompressedGaussian;
 use super::law::{Coupled, Law};
-use super::statistics::{Residual, Spread, Statistics};
+use super::memory::Memory;
+use super::statistics::{Directions, Residual, Spread, Statistics};
 use crate::discrepancies::common::{Noise, Normal, Replicates, conditional, values};
 
 /// The likelihood (see the module).
@@ -27,7 +28,12 @@ pub(super) struct GaussianLikelihood {
     pub(super) law: Law,
     /// Density output by output, if common errors couple the groups; made when it is asked for.
     normal: OnceLock<Option<Normal>>,
+    /// Directions of the common errors for parts of the data.
+    memory: Memory,
 }
+
+/// Number of responses whose residuals are split together, so that they stay in the cache.
+const TOGETHER: usize = 16;
 
 /// Residual of each group: components along the directions, and the remaining vector.
 type Split = Vec<(Vec<f64>, Vec<f64>)>;
@@ -70,7 +76,8 @@ impl GaussianLikelihood {
             }
             _ => Law::Given(noise.variance.clone()),
         };
-        Ok(Self { hyper, noise, groups, law, normal: OnceLock::new() })
+        let (normal, memory) = (OnceLock::new(), Memory::default());
+        Ok(Self { hyper, noise, groups, law, normal, memory })
     }
 
     /// Density output by output, if common errors couple the groups.
@@ -91,7 +98,18 @@ impl GaussianLikelihood {
     }
 
     fn split(&self, response: &[f64]) -> Split {
-        self.groups.iter().map(|g| g.split(response)).collect()
+        self.groups.iter().flat_map(|g| g.split(&[response])).collect()
+    }
+
+    /// Directions of the common errors for the weights of a part of the data; `None` if they couple several groups.
+    fn other_directions(&self, part: &Statistics) -> Option<Arc<Directions>> {
+        let common = &self.noise.setting.common;
+        let make = || part.common_directions(common).ok();
+        match &self.law {
+            Law::Coupled(_) => None,
+            _ if self.groups.len() > 1 => Some(Arc::clone(&part.common)),
+            _ => self.memory.directions(&part.share, make),
+        }
     }
 
     /// Returns the variance of each group given the response, as pairs of values and probabilities.
@@ -170,11 +188,13 @@ impl Likelihood for GaussianLikelihood {
         self.law.log_likelihood(&self.spreads(), hyper, &residuals(&split))
     }
 
-    /// The directions of the common errors are those of all data if every output lost the same share of its replicates.
+    /// The directions of the common errors are those of all data if every output lost the same share of its replicates, and
+    /// otherwise those of the first part with these numbers of replicates.
     fn of_part(&self, part: &Measurements) -> Option<Box<dyn Likelihood>> {
         let replicates = Replicates::of(part, &[]).ok()?;
         let scale = &self.noise.scale;
-        let groups = self.groups.iter().map(|g| g.of_part(&replicates, scale));
+        let directions = |part: &Statistics| self.other_directions(part);
+        let groups = self.groups.iter().map(|g| g.of_part(&replicates, scale, directions));
         let groups = groups.collect::<Option<Vec<Statistics>>>()?;
         Some(Box::new(Self {
             hyper: self.hyper.clone(),
@@ -182,7 +202,24 @@ impl Likelihood for GaussianLikelihood {
             noise: self.noise.of_part(part, &replicates),
             groups,
             normal: OnceLock::new(),
+            memory: Memory::default(),
         }))
+    }
+
+    fn log_likelihoods(&self, responses: &Matrix, hyper: &Matrix) -> Vec<f64> {
+        let rows: Vec<&[f64]> = responses.iter_rows().collect();
+        let spreads = self.spreads();
+        let mut all = Vec::with_capacity(rows.len());
+        for some in rows.chunks(TOGETHER) {
+            let mut splits: Vec<_> =
+                self.groups.iter().map(|g| g.split(some).into_iter()).collect();
+            for _ in some {
+                let split: Split = splits.iter_mut().filter_map(Iterator::next).collect();
+                let own = hyper.row(all.len());
+                all.push(self.law.log_likelihood(&spreads, own, &residuals(&split)));
+            }
+        }
+        all
     }
 
     fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {

@@ -5,6 +5,7 @@ mod grams;
 mod integral;
 mod law;
 mod likelihood;
+mod memory;
 mod stated;
 mod statistics;
 #[cfg(test)]

@@ -30,7 +30,7 @@ pub(super) struct Statistics {
     /// `sqrt(n_i)` of each output over the root of its scale.
     pub weight: Vec<f64>,
     /// `weight / sqrt(n)` of each output: the weights that parts of the data may have in common.
-    share: Vec<f64>,
+    pub share: Vec<f64>,
     /// `sqrt(n)`.
     pub root: f64,
     /// Weight times `ybar_i` of each output.
@@ -149,12 +149,22 @@ impl Statistics {
         self
     }
 
-    /// The statistics of a part of the data with the same directions; `None` if it has others.
-    pub fn of_part(&self, replicates: &Replicates, scale: &[f64]) -> Option<Self> {
+    /// The statistics of a part of the data, with the directions that `other` gives for weights other than these; `None`
+    /// without directions or if an output is missing altogether.
+    pub fn of_part(
+        &self,
+        replicates: &Replicates,
+        scale: &[f64],
+        other: impl FnOnce(&Self) -> Option<Arc<Directions>>,
+    ) -> Option<Self> {
         let own = |i: usize| self.measured.binary_search(&i).is_ok();
         let part = Self::without_common(replicates, scale, own);
-        let same = part.measured == self.measured && part.share == self.share;
-        same.then(|| part.along(Arc::clone(&self.common)))
+        if part.measured != self.measured {
+            return None;
+        }
+        let same = part.share == self.share;
+        let directions = if same { Some(Arc::clone(&self.common)) } else { other(&part) };
+        directions.map(|directions| part.along(directions))
     }
 
     /// Like [`Statistics::of`], without common errors.
@@ -199,7 +209,7 @@ impl Statistics {
     }
 
     /// Returns the directions of the common errors, by their sizes.
-    fn common_directions(&self, common: &[CommonError]) -> Result<Directions, Stop> {
+    pub fn common_directions(&self, common: &[CommonError]) -> Result<Directions, Stop> {
         let weighted = self.weighted(common);
         if weighted.columns() == 0 {
             return Ok(Directions::none(self.measured.len()));
@@ -214,19 +224,29 @@ impl Statistics {
         })
     }
 
-    /// Returns the residual along the directions of the common errors, and the remaining vector.
-    pub fn split(&self, response: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let outputs = self.measured.iter().zip(&self.weight).zip(&self.weighted_mean);
-        let mut outside: Vec<f64> = outputs.map(|((&i, w), mean)| mean - w * response[i]).collect();
-        let mut along = Vec::with_capacity(self.common.rows.rows());
-        for direction in self.common.rows.iter_rows() {
-            along.push(dot(direction, &outside));
-        }
-        for (direction, &a) in self.common.rows.iter_rows().zip(&along) {
-            for (z, u) in outside.iter_mut().zip(direction) {
-                *z -= a * u;
+    /// Returns the residual of each response along the directions of the common errors, and the remaining vector. A
+    /// direction is read once for all responses, each of which has the same numbers as alone.
+    pub fn split(&self, responses: &[&[f64]]) -> Vec<(Vec<f64>, Vec<f64>)> {
+        let directions = &self.common.rows;
+        let start = |response: &&[f64]| {
+            let outputs = self.measured.iter().zip(&self.weight).zip(&self.weighted_mean);
+            let outside = outputs.map(|((&i, w), mean)| mean - w * response[i]).collect();
+            (Vec::with_capacity(directions.rows()), outside)
+        };
+        let mut all: Vec<(Vec<f64>, Vec<f64>)> = responses.iter().map(start).collect();
+        for direction in directions.iter_rows() {
+            for (along, outside) in &mut all {
+                along.push(dot(direction, outside));
             }
         }
-        (along, outside)
+        for (k, direction) in directions.iter_rows().enumerate() {
+            for (along, outside) in &mut all {
+                let a = along[k];
+                for (z, u) in outside.iter_mut().zip(direction) {
+                    *z -= a * u;
+                }
+            }
+        }
+        all
     }
 }

@@ -96,6 +96,9 @@ fn scenarios(layout: &Layout) -> Parts {
     }
 }
 
+/// Number of draws at which a likelihood is computed together.
+const TOGETHER: usize = 32;
+
 /// Log density of each curve given all other data and the parameters, `draws x curves`: the log-likelihood of all data
 /// less that of the data without the curve. `None` if the discrepancy has no such form.
 ///
@@ -112,12 +115,15 @@ pub fn left_out(
     let values = |block: usize, likelihood: &dyn Likelihood| -> Vec<f64> {
         let place = |own: &Hyperparameter| names.iter().position(|other| other.name == own.name);
         let places: Vec<Option<usize>> = likelihood.hyperparameters().iter().map(place).collect();
-        let one = |(i, response): (usize, &Vec<f64>)| {
-            let own: Vec<f64> =
-                places.iter().map(|p| p.map_or(f64::NAN, |p| hyper[(i, p)])).collect();
-            likelihood.log_likelihood(&response[ranges[block].clone()], &own)
+        let some = |(chunk, responses): (usize, &[Vec<f64>])| {
+            let range = ranges[block].clone();
+            let rows = responses.iter().map(|response| &response[range.clone()]);
+            let own = Matrix::from_fn(responses.len(), places.len(), |i, k| {
+                places[k].map_or(f64::NAN, |place| hyper[(chunk * TOGETHER + i, place)])
+            });
+            likelihood.log_likelihoods(&Matrix::from_rows(range.len(), rows), &own)
         };
-        responses.par_iter().enumerate().map(one).collect()
+        responses.par_chunks(TOGETHER).enumerate().flat_map_iter(some).collect()
     };
     for (block, measured) in data.blocks.iter().enumerate() {
         let Some(all) = law.part(block, measured)? else { return Ok(None) };
