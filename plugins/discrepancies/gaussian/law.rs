@@ -30,8 +30,6 @@ pub(super) enum Law {
 #[derive(Debug, Clone)]
 pub(super) struct Coupled {
     variance: PerGroup,
-    /// `T_g` over `sqrt(n)`, as in [`statistics`](super::statistics), of each group.
-    shares: Arc<Vec<Matrix>>,
     /// `T_g` of each group.
     factors: Vec<Matrix>,
     grams: Grams,
@@ -48,14 +46,6 @@ pub(super) struct Slopes {
 }
 
 impl Law {
-    /// The treatment of a part of the data whose groups have the same directions.
-    pub fn of_part(&self, groups: &[Statistics]) -> Self {
-        match self {
-            Self::Coupled(coupled) => Self::Coupled(coupled.of_part(groups)),
-            alone => alone.clone(),
-        }
-    }
-
     /// Returns the log-likelihood; minus infinity if a variance is not above zero.
     pub fn log_likelihood(
         &self,
@@ -185,27 +175,15 @@ impl Coupled {
         let svd = lacuna_linalg::thin_svd(&all).map_err(failed)?;
         let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
         let turn = svd.v.select_columns(&(0..rank).collect::<Vec<_>>());
-        let mut shares = Vec::new();
+        let mut factors = Vec::new();
         for (group, weighted) in groups.iter_mut().zip(&weighted) {
             let qr = lacuna_linalg::thin_qr(&lacuna_linalg::multiply(weighted, &turn))
                 .map_err(failed)?;
-            group.common = Arc::new(Directions { rows: qr.q.transposed(), sizes: Vec::new() });
-            shares.push(qr.r);
+            group.common =
+                Arc::new(Directions { rows: qr.q.transposed(), eigenvalues: Vec::new() });
+            factors.push(qr.r);
         }
-        Ok(Self::of(variance, Arc::new(shares), groups))
-    }
-
-    fn of(variance: PerGroup, shares: Arc<Vec<Matrix>>, groups: &[Statistics]) -> Self {
-        let scaled = |(share, group): (&Matrix, &Statistics)| {
-            Matrix::from_fn(share.rows(), share.columns(), |i, k| group.root * share[(i, k)])
-        };
-        let factors: Vec<Matrix> = shares.iter().zip(groups).map(scaled).collect();
-        Self { variance, shares, grams: Grams::of(&factors), factors }
-    }
-
-    /// The coupling of a part of the data whose groups have the same directions.
-    pub fn of_part(&self, groups: &[Statistics]) -> Self {
-        Self::of(self.variance.clone(), Arc::clone(&self.shares), groups)
+        Ok(Self { variance, grams: Grams::of(&factors), factors })
     }
 
     fn solve<'a>(&'a self, hyper: &'a [f64], residuals: &[Residual<'_>]) -> Option<Solved<'a>> {

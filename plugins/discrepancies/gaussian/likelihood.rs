@@ -101,14 +101,15 @@ impl GaussianLikelihood {
         self.groups.iter().flat_map(|g| g.split(&[response])).collect()
     }
 
-    /// Directions of the common errors for the weights of a part of the data; `None` if they couple several groups.
+    /// Directions of the common errors for the weights of a part of the data; `None` if they couple several groups, whose
+    /// factors a part would need too.
     fn other_directions(&self, part: &Statistics) -> Option<Arc<Directions>> {
         let common = &self.noise.setting.common;
         let make = || part.common_directions(common).ok();
         match &self.law {
             Law::Coupled(_) => None,
             _ if self.groups.len() > 1 => Some(Arc::clone(&part.common)),
-            _ => self.memory.directions(&part.share, make),
+            _ => self.memory.directions(&part.weight, make),
         }
     }
 
@@ -188,8 +189,7 @@ impl Likelihood for GaussianLikelihood {
         self.law.log_likelihood(&self.spreads(), hyper, &residuals(&split))
     }
 
-    /// The directions of the common errors are those of all data if every output lost the same share of its replicates, and
-    /// otherwise those of the first part with these numbers of replicates.
+    /// The directions of the common errors are those of the first part with the same number of replicates of each output.
     fn of_part(&self, part: &Measurements) -> Option<Box<dyn Likelihood>> {
         let replicates = Replicates::of(part, &[]).ok()?;
         let scale = &self.noise.scale;
@@ -198,7 +198,7 @@ impl Likelihood for GaussianLikelihood {
         let groups = groups.collect::<Option<Vec<Statistics>>>()?;
         Some(Box::new(Self {
             hyper: self.hyper.clone(),
-            law: self.law.of_part(&groups),
+            law: self.law.clone(),
             noise: self.noise.of_part(part, &replicates),
             groups,
             normal: OnceLock::new(),

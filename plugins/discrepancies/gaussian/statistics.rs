@@ -8,10 +8,8 @@
 //! ```
 //!
 //! where `K = W F F' W`, `W = diag(sqrt(n_i))`, is the covariance `F F'` of the common errors as it enters `z`. The
-//! thin singular value decomposition `W F / sqrt(n) = U diag(s) V'`, with `n` the largest of all `n_i`, diagonalises `K` once
-//! for all `v`. It is that of every part of the data in which all `n_i` are smaller by the same factor, such as the data
-//! without one of the replicates. If the variance is a multiple of a known one, all of these are statistics of the data
-//! divided by its root.
+//! thin singular value decomposition `W F = U diag(s) V'` diagonalises `K` once for all `v`. If the variance is a
+//! multiple of a known one, all of these are statistics of the data divided by its root.
 
 use std::sync::Arc;
 
@@ -29,15 +27,11 @@ pub(super) struct Statistics {
     pub measured: Vec<usize>,
     /// `sqrt(n_i)` of each output over the root of its scale.
     pub weight: Vec<f64>,
-    /// `weight / sqrt(n)` of each output: the weights that parts of the data may have in common.
-    pub share: Vec<f64>,
-    /// `sqrt(n)`.
-    pub root: f64,
     /// Weight times `ybar_i` of each output.
     pub weighted_mean: Vec<f64>,
     /// Statistics that do not depend on the response.
     pub spread: Spread,
-    /// Directions of the common errors.
+    /// Directions of the common errors, which parts of the data with the same weights share.
     pub common: Arc<Directions>,
 }
 
@@ -46,14 +40,14 @@ pub(super) struct Statistics {
 pub(super) struct Directions {
     /// `U'` (`rank x measured`).
     pub rows: Matrix,
-    /// `s`; empty if the common errors couple several groups.
-    pub sizes: Vec<f64>,
+    /// Eigenvalues of `K`; empty if the common errors couple several groups.
+    pub eigenvalues: Vec<f64>,
 }
 
 impl Directions {
     /// No directions among some outputs.
     fn none(measured: usize) -> Self {
-        Self { rows: Matrix::zeros(0, measured), sizes: Vec::new() }
+        Self { rows: Matrix::zeros(0, measured), eigenvalues: Vec::new() }
     }
 }
 
@@ -144,7 +138,7 @@ impl Statistics {
 
     /// Sets the directions of the common errors.
     pub fn along(mut self, common: Arc<Directions>) -> Self {
-        self.spread.eigenvalues = common.sizes.iter().map(|s| (s * self.root).powi(2)).collect();
+        self.spread.eigenvalues.clone_from(&common.eigenvalues);
         self.common = common;
         self
     }
@@ -162,7 +156,7 @@ impl Statistics {
         if part.measured != self.measured {
             return None;
         }
-        let same = part.share == self.share;
+        let same = part.weight == self.weight;
         let directions = if same { Some(Arc::clone(&self.common)) } else { other(&part) };
         directions.map(|directions| part.along(directions))
     }
@@ -178,7 +172,6 @@ impl Statistics {
         let scales = || kept.iter().map(|&k| scale[r.measured[k]]);
         let counts = || kept.iter().map(|&k| r.count[k]);
         let weight: Vec<f64> = counts().zip(scales()).map(|(n, s)| n.sqrt() / s.sqrt()).collect();
-        let root = r.count.iter().copied().fold(0.0, f64::max).sqrt();
         let spread = Spread {
             count: counts().sum(),
             scatter: kept.iter().zip(scales()).map(|(&k, s)| r.scatter[k] / s).sum(),
@@ -188,15 +181,13 @@ impl Statistics {
         Self {
             measured: kept.iter().map(|&k| r.measured[k]).collect(),
             weighted_mean: kept.iter().zip(&weight).map(|(&k, w)| w * r.mean[k]).collect(),
-            share: counts().zip(scales()).map(|(n, s)| n.sqrt() / root / s.sqrt()).collect(),
-            root,
             common: Arc::new(Directions::none(kept.len())),
             weight,
             spread,
         }
     }
 
-    /// Returns the factor of the common errors as it enters the residual, over `sqrt(n)` (`measured x columns`).
+    /// Returns the factor of the common errors as it enters the residual (`measured x columns`).
     pub fn weighted(&self, common: &[CommonError]) -> Matrix {
         let columns: Vec<(&Matrix, usize)> = common
             .iter()
@@ -204,11 +195,11 @@ impl Statistics {
             .collect();
         Matrix::from_fn(self.measured.len(), columns.len(), |i, k| {
             let (factor, column) = columns[k];
-            self.share[i] * factor[(self.measured[i], column)]
+            self.weight[i] * factor[(self.measured[i], column)]
         })
     }
 
-    /// Returns the directions of the common errors, by their sizes.
+    /// Returns eigenvectors and eigenvalues of the covariance `K` of all common errors.
     pub fn common_directions(&self, common: &[CommonError]) -> Result<Directions, Stop> {
         let weighted = self.weighted(common);
         if weighted.columns() == 0 {
@@ -220,7 +211,7 @@ impl Statistics {
         let kept: Vec<usize> = (0..rank).collect();
         Ok(Directions {
             rows: svd.u.select_columns(&kept).transposed(),
-            sizes: svd.values[..rank].to_vec(),
+            eigenvalues: svd.values[..rank].iter().map(|s| s * s).collect(),
         })
     }
 
