@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use lacuna::matrix::Matrix;
-use lacuna_run::process::{Printed, Process, ending};
+use lacuna_run::process::{Printed, Process, ending, keep_freed_memory};
 use serde_json::{Map, Value as Json, json};
 
 use crate::message::{self, Message};
@@ -64,6 +64,7 @@ impl Worker {
         let mut command = Command::new(interpreter);
         command.args(["-c", &PROGRAM]).arg(file);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        keep_freed_memory(&mut command);
         let shown = interpreter.display();
         let mut process = Process::start(&mut command)
             .map_err(|error| format!("`{shown}` cannot be run: {error}"))?;

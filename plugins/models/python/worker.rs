@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use super::frame::{self, Answer};
 use crate::models::given::{layout_document, scenario_document};
-use lacuna_run::process::{Printed, Process, ending};
+use lacuna_run::process::{Printed, Process, ending, keep_freed_memory};
 
 const SCRIPT: &str =
     concat!(include_str!("../../../python/lacuna/user_file.py"), include_str!("worker.py"));
@@ -74,6 +74,7 @@ impl Worker {
         let mut command = Command::new(interpreter);
         command.args(["-c", SCRIPT]).args(arguments).current_dir(study);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        keep_freed_memory(&mut command);
         let mut process = Process::start(&mut command).map_err(ended)?;
         let child = process.child();
         let (Some(requests), Some(output), Some(errors)) =

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use std::{io, thread};
 
 pub use printed::{Printed, ending};
-pub use program::{find, interpreter};
+pub use program::{find, interpreter, keep_freed_memory};
 pub use tail::{tail, tail_of_file};
 
 /// The time a process that was asked to end (SIGTERM) leaves to this program, to be asked as well.

@@ -3,6 +3,7 @@
 use std::env;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// The file of a command's first word: a path relative to `directory`, or a name that is searched for in the
 /// directories of `path` (those of the environment if `None`). Returns `None` if there is no such executable file.
@@ -24,6 +25,17 @@ pub fn interpreter(path: &Path, directory: &Path) -> Option<PathBuf> {
     let inside = if cfg!(windows) { "Scripts/python" } else { "bin/python" };
     let path = if folder.is_dir() { folder.join(inside) } else { path.to_owned() };
     find(path.to_str()?, directory, None)
+}
+
+/// Lets a process that computes with large arrays keep the memory that it frees: under the C library of GNU each array above
+/// some MB is otherwise asked of the system and returned to it, and its pages are cleared each time, which takes NumPy as long
+/// as the sums themselves. Variables that are set already keep their values.
+pub fn keep_freed_memory(command: &mut Command) {
+    for name in ["MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"] {
+        if env::var_os(name).is_none() {
+            command.env(name, (1_u32 << 30).to_string());
+        }
+    }
 }
 
 #[cfg(unix)]
