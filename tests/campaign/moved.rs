@@ -16,13 +16,14 @@ echo \"[$2]\"";
 
 const ONE_BY_ONE: &str = "executor={ use = \"local\", processes = 1 }";
 
-/// Starts a command and ends it as soon as the campaign has this number of results.
-fn until_done(command: &mut Command, out: &Path, count: usize) {
+/// Starts a command and ends it as soon as the campaign has this number of results and has begun a run.
+fn until_done(command: &mut Command, folder: &Path, count: usize, begun: &str) {
     let mut child: Child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     wait_for("results", || {
         let mut status = quick::command();
-        let output = status.args(["campaign", "status"]).arg(out).output().unwrap();
-        String::from_utf8_lossy(&output.stdout).contains(&format!(" {count} done"))
+        let output = status.args(["campaign", "status"]).arg(folder.join("run")).output().unwrap();
+        let done = String::from_utf8_lossy(&output.stdout).contains(&format!(" {count} done"));
+        done && made(folder).iter().any(|name| name == begun)
     });
     child.kill().unwrap();
     child.wait().unwrap();
@@ -52,12 +53,12 @@ fn a_campaign_moves_to_a_cluster_and_back() {
     let results = quick::results(&direct.join("run"));
 
     let laptop = copied(source.path(), &root.path().join("laptop"), "run001 run002");
-    until_done(&mut on(&laptop, ONE_BY_ONE), &laptop.join("run"), 2);
+    until_done(&mut on(&laptop, ONE_BY_ONE), &laptop, 2, "run003");
 
     let permitted = "run001 run002 run003 run004";
     let cluster = copied(&laptop, &root.path().join("cluster"), permitted);
     let executor = format!("executor={{ use = \"hyperqueue\", {} }}", server.inline());
-    until_done(&mut on(&cluster, &executor), &cluster.join("run"), 4);
+    until_done(&mut on(&cluster, &executor), &cluster, 4, "run004");
 
     let back = copied(&cluster, &root.path().join("back"), whole);
     let (code, text) = quick::said(&mut on(&back, ONE_BY_ONE));
