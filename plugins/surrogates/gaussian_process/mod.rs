@@ -12,17 +12,17 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::kriging::{
-    Bounds, Kernel, Kriging, LengthScales, Nugget, Regressors, Settings, Standard, Trends,
+    Approximation, Bounds, Kernel, Kriging, LengthScales, Nugget, Regressors, Settings, Standard,
+    Trends,
 };
 use super::principal_components::Components;
 
 /// Gaussian process regression (kriging): between the runs the response is interpolated as a Gaussian process
 /// conditioned on the runs.
 ///
-/// Use it for few runs (tens to some hundreds) of a smooth response, and if the emulator's own uncertainty at each
-/// point matters: among the surrogates only this one and `polynomial_chaos_kriging` have a variance that grows away
-/// from the runs. The fitting time grows with the cube of the number of runs; for many more runs, or for Sobol'
-/// indices, use `polynomial_chaos`.
+/// Use it for few runs (tens to some hundreds) of a smooth response, or for many thousands of runs with local features,
+/// and if the emulator's own uncertainty at each point matters: among the surrogates only this one and
+/// `polynomial_chaos_kriging` have a variance that grows away from the runs. For Sobol' indices use `polynomial_chaos`.
 ///
 /// The outputs are reduced to a few principal components. Each component is one Gaussian process of the parameters
 /// with a trend, a length scale for each parameter and a nugget (noise). Length scales and nugget maximise the
@@ -32,6 +32,17 @@ use super::principal_components::Components;
 /// optimistic. The variance is that of a new run about the emulator's mean: it includes the uncertainty of the trend,
 /// the nugget and the part that the components leave out, but not the uncertainty of the hyperparameters.
 ///
+/// With more than 2000 runs (`approximation`) no covariance of all runs is factored, whose time grows with the cube of
+/// their number. The likelihood is that of each run given its nearest predecessors in an order from coarse to fine
+/// (Vecchia's approximation; neighbours in the metric of the length scales), summed over at most 2000 runs spread evenly
+/// over the order. The search begins with the exact likelihood of 1000 runs. The mean stays that of all runs, smooth and
+/// with an exact gradient: its weights solve the equations of the exact covariance by conjugate gradients, which that
+/// approximation preconditions, to a hundredth of the typical standard error. The variance is that of the best prediction from the
+/// nearest runs alone, an upper bound for that of the mean; so are the leave-one-out errors. As neighbours change from point to
+/// point, the variance has small jumps. Where the equations are too nearly dependent (`"squared_exponential"`; smooth
+/// responses without noise in many dimensions) the nugget is raised until they can be solved, and the report shows it.
+/// The memory grows with runs times neighbours, the time for the weights with the square of the runs.
+///
 /// Parameters are measured on the scale of their design, log-uniform and log-normal ones by their logarithms. Far
 /// outside the design the mean returns to the trend.
 ///
@@ -40,7 +51,13 @@ use super::principal_components::Components;
 /// Gattiker, Williams and Rightley, *Computer model calibration using high-dimensional output*, Journal of the
 /// American Statistical Association 103 (2008) 570; Dubrule, *Cross validation of kriging in a unique neighborhood*,
 /// Mathematical Geology 15 (1983) 687; Harville, *Bayesian inference for variance components using only error
-/// contrasts*, Biometrika 61 (1974) 383.
+/// contrasts*, Biometrika 61 (1974) 383; Vecchia, *Estimation and model identification for continuous spatial
+/// processes*, Journal of the Royal Statistical Society B 50 (1988) 297; Guinness, *Permutation and grouping methods for
+/// sharpening Gaussian process approximations*, Technometrics 60 (2018) 415; Guinness, *Gaussian process learning via
+/// Fisher scoring of Vecchia's approximation*, Statistics and Computing 31 (2021) 25; Katzfuss and Guinness, *A general
+/// framework for Vecchia approximations of Gaussian processes*, Statistical Science 36 (2021) 124; Katzfuss, Guinness and
+/// Lawrence, *Scaled Vecchia approximation for fast computer-model emulation*, SIAM/ASA Journal on Uncertainty
+/// Quantification 10 (2022) 537.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GaussianProcess {
@@ -53,6 +70,9 @@ pub struct GaussianProcess {
     /// Variance of the noise of the runs (the deviation from a smooth response), as a fraction of the variance of the
     /// process: a number, or `"estimated"`.
     pub nugget: Nugget,
+    /// Covariance of the runs: `"exact"`, or `{ neighbours = 100 }` for that of each run with its nearest ones, whose
+    /// cost is about linear in the number of runs; `"automatic"` is exact with at most 2000 runs.
+    pub approximation: Approximation,
     /// Principal components of the outputs: as many as carry a fraction of the variance, `{ variance = 0.99999 }`, or
     /// `{ count = 20 }`; `"none"` gives every output a process of its own.
     pub components: Components,
@@ -81,6 +101,7 @@ impl Default for GaussianProcess {
             trend: Trend::default(),
             length_scales: LengthScales::default(),
             nugget: Nugget::default(),
+            approximation: Approximation::default(),
             components: Components::Variance(0.99999),
             starts: 4,
             bounds: Bounds::default(),
@@ -97,6 +118,7 @@ impl GaussianProcess {
             kernel: self.kernel,
             length_scales: self.length_scales,
             nugget: self.nugget,
+            approximation: self.approximation,
             components: self.components,
             starts: self.starts,
             bounds: self.bounds,

@@ -161,10 +161,34 @@ fn options_are_read_as_written() {
         "components = \"none\"",
         "components = { count = 3 }",
         "bounds = { length_scale = [0.1, 10.0] }",
+        "approximation = \"automatic\"",
+        "approximation = \"exact\"",
+        "approximation = { neighbours = 30 }",
     ] {
         assert!(read(sound).is_ok(), "{sound}");
     }
-    for wrong in ["nugget = \"guessed\"", "kernel = \"cubic\"", "components = { share = 1 }"] {
+    for wrong in [
+        "nugget = \"guessed\"",
+        "kernel = \"cubic\"",
+        "components = { share = 1 }",
+        "approximation = { neighbors = 30 }",
+        "approximation = \"neighbours\"",
+    ] {
         assert!(read(wrong).is_err(), "{wrong}");
     }
+}
+
+#[test]
+fn neighbours_are_some_of_the_other_runs() {
+    let case = Case::new(2, branin);
+    for (neighbours, sound) in [(0, false), (1, true), (99, true), (100, false)] {
+        let approximation = Approximation::Neighbours(neighbours);
+        assert_eq!(approximation.fault(Some(100)).is_none(), sound, "{neighbours}");
+        let options = GaussianProcess { approximation, starts: 1, ..GaussianProcess::default() };
+        let fitted = options.krige(&case.training(), &Stream::root(1), &Progress::new(&Silent));
+        assert_eq!(fitted.is_ok(), sound, "{neighbours}");
+    }
+    assert_eq!(Approximation::Automatic.neighbours(2000), None);
+    assert_eq!(Approximation::Automatic.neighbours(2001), Some(100));
+    assert_eq!(Approximation::Exact.neighbours(9000), None);
 }

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::field::{Choice, Field, Runs};
 use super::kernel::Kernel;
+use super::nearest::{Conditioned, Restored};
 use super::regressors::{Regressors, Written};
 use super::standard::{Standard, standardised};
 use crate::surrogates::polynomial_chaos::bytes;
@@ -53,6 +54,9 @@ struct Header {
     standards: Vec<Standard>,
     regressors: Written,
     choices: Vec<Choice>,
+    /// Results of conditioning on many runs; empty for exact processes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    found: Vec<Restored>,
     runs: usize,
     components: usize,
     outputs: usize,
@@ -87,11 +91,14 @@ impl Kriging {
     pub fn from_bytes(plugin: &'static str, bytes: &[u8]) -> Result<Self, Stop> {
         let damaged = || bytes::damaged_as(plugin);
         let (header, mut numbers) = bytes::read_as::<Header>(plugin, bytes)?;
-        let Header { kernel, names, standards, regressors, choices, runs, components, outputs } =
-            header;
+        let Header { kernel, names, standards, regressors, choices, .. } = header;
+        let Header { found, runs, components, outputs, .. } = header;
         let d = standards.len();
         let shapes = [(runs, d), (runs, components), (components + 1, outputs), (1, outputs)];
-        let shapes = [&shapes[..], &[(1, outputs), (runs, outputs)]].concat();
+        let mut shapes = [&shapes[..], &[(1, outputs), (runs, outputs)]].concat();
+        if !found.is_empty() {
+            shapes.extend([(components, runs), (choices.len(), runs)]);
+        }
         let sizes: Option<Vec<usize>> = shapes.iter().map(|(m, n)| m.checked_mul(*n)).collect();
         let total = sizes
             .as_ref()
@@ -114,8 +121,25 @@ impl Kriging {
         if !choices.iter().all(sound) {
             return Err(damaged());
         }
-        let fields = condition(kernel, choices, &standards, &regressors, &points, &scores);
-        let fields = fields.ok_or_else(damaged)?;
+        let fields = if found.is_empty() {
+            condition(kernel, choices, &standards, &regressors, &points, &scores)
+        } else {
+            let (alpha, precisions) = (part()?, part()?);
+            let whole = Runs {
+                points: &standardised(&standards, &points),
+                regressors: &regressors.values(&points),
+                scores: &scores,
+            };
+            let restore = |(f, (choice, restored)): (usize, (Choice, Restored))| {
+                let alpha = alpha.select_rows(&choice.components);
+                let precisions = precisions.row(f).to_vec();
+                Field::restored(kernel, choice, whole, Conditioned { restored, alpha, precisions })
+            };
+            let same = choices.len() == found.len();
+            let parts: Vec<_> = choices.into_iter().zip(found).enumerate().collect();
+            same.then(|| parts.into_par_iter().map(restore).collect()).flatten()
+        };
+        let fields: Vec<Field> = fields.ok_or_else(damaged)?;
         Ok(Self {
             plugin,
             kernel,
@@ -216,6 +240,7 @@ impl Emulator for Kriging {
     }
 
     fn facts(&self) -> Vec<Fact> {
+        let neighbours = self.fields.first().and_then(|field| field.choice.neighbours);
         let all = |value: &dyn Fn(&Field) -> f64| spread(self.fields.iter().map(value).collect());
         let mut facts = vec![
             Fact::new("kernel", self.kernel.name()),
@@ -225,6 +250,7 @@ impl Emulator for Kriging {
                 all(&|f| f.choice.terms.len() as f64),
             ),
         ];
+        facts.extend(neighbours.map(|count| Fact::new("neighbours of a run", count)));
         for (k, name) in self.names.iter().enumerate() {
             let what =
                 format!("length scale of `{name}` (least, median, largest; 1 is the design)");
@@ -237,17 +263,25 @@ impl Emulator for Kriging {
     }
 
     fn save(&self) -> Result<Vec<u8>, Stop> {
+        let found: Vec<Conditioned> = self.fields.iter().filter_map(Field::found).collect();
         let header = Header {
             kernel: self.kernel,
             names: self.names.clone(),
             standards: self.standards.clone(),
             regressors: self.regressors.written(),
             choices: self.fields.iter().map(|f| f.choice.clone()).collect(),
+            found: found.iter().map(|found| found.restored.clone()).collect(),
             runs: self.points.rows(),
             components: self.scores.columns(),
             outputs: self.outputs(),
         };
-        let numbers = [
+        let mut alpha = Matrix::zeros(self.scores.columns(), self.points.rows());
+        for (field, found) in self.fields.iter().zip(&found) {
+            for (&c, row) in field.choice.components.iter().zip(found.alpha.iter_rows()) {
+                alpha.row_mut(c).copy_from_slice(row);
+            }
+        }
+        let mut numbers = vec![
             self.points.as_slice(),
             self.scores.as_slice(),
             self.loadings.as_slice(),
@@ -255,6 +289,10 @@ impl Emulator for Kriging {
             &self.fit_error.relative,
             self.fit_error.residuals.as_slice(),
         ];
+        if !found.is_empty() {
+            numbers.push(alpha.as_slice());
+            numbers.extend(found.iter().map(|found| &found.precisions[..]));
+        }
         bytes::write_as(self.plugin, &header, &numbers)
     }
 

@@ -31,7 +31,51 @@ pub struct Weights {
 }
 
 /// Jitters added to the diagonal in turn if a covariance cannot be factored to working precision.
-const JITTERS: [f64; 8] = [0.0, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8];
+pub const JITTERS: [f64; 8] = [0.0, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8];
+
+/// Factors of a whitened trend `L^-1 F = Q R`.
+pub struct WhiteTrend {
+    /// `Q` (`N x p`).
+    pub q: Matrix,
+    /// `R^-1` (`p x p`), upper triangular.
+    pub r_inverse: Matrix,
+    /// `log |F' K^-1 F|`.
+    pub log_information: f64,
+}
+
+impl WhiteTrend {
+    /// Factors `L^-1 F`; `None` if its columns are dependent.
+    pub fn new(white: &Matrix) -> Option<Self> {
+        let lacuna_linalg::Qr { q, r } = thin_qr(white).ok()?;
+        let p = r.rows();
+        let size = |i: usize| r[(i, i)].abs();
+        let largest = (0..p).map(size).fold(0.0, f64::max);
+        if p < white.columns() || (0..p).any(|i| size(i) <= 1e-12 * largest) {
+            return None;
+        }
+        let mut r_inverse = Matrix::from_fn(p, p, |i, j| f64::from(u8::from(i == j)));
+        solve_upper_matrix(&r, &mut r_inverse);
+        let log_information = 2.0 * (0..p).map(|i| size(i).ln()).sum::<f64>();
+        Some(Self { q, r_inverse, log_information })
+    }
+}
+
+/// Returns `(I - Q Q') W` and `Q' W` for whitened scores `W`.
+pub fn without(q: &Matrix, mut white: Matrix) -> (Matrix, Matrix) {
+    let along = transposed_multiply(q, &white);
+    let fitted = multiply(q, &along);
+    white.as_mut_slice().iter_mut().zip(fitted.as_slice()).for_each(|(w, f)| *w -= f);
+    (white, along)
+}
+
+/// Returns the sums of squares of the columns.
+pub fn column_squares(matrix: &Matrix) -> Vec<f64> {
+    let mut squares = vec![0.0; matrix.columns()];
+    for row in matrix.iter_rows() {
+        squares.iter_mut().zip(row).for_each(|(sum, w)| *sum += w * w);
+    }
+    squares
+}
 
 impl Factor {
     /// Factors a covariance (its lower triangle, of unit size) and a trend `F` (`N x p`); returns also the jitter
@@ -53,23 +97,20 @@ impl Factor {
 
     fn of(cholesky: &Cholesky, trend: &Matrix) -> Option<Self> {
         let lower_inverse = cholesky.lower_inverse();
-        let white = multiply(&lower_inverse, trend);
-        let lacuna_linalg::Qr { q, r } = thin_qr(&white).ok()?;
-        let p = r.rows();
-        let size = |i: usize| r[(i, i)].abs();
-        let largest = (0..p).map(size).fold(0.0, f64::max);
-        if p < trend.columns() || (0..p).any(|i| size(i) <= 1e-12 * largest) {
-            return None;
-        }
-        let mut r_inverse = Matrix::from_fn(p, p, |i, j| f64::from(u8::from(i == j)));
-        solve_upper_matrix(&r, &mut r_inverse);
-        Some(Self {
-            lower_inverse,
-            q,
-            r_inverse,
-            log_determinant: cholesky.log_determinant(),
-            log_information: 2.0 * (0..p).map(|i| size(i).ln()).sum::<f64>(),
-        })
+        let WhiteTrend { q, r_inverse, log_information } =
+            WhiteTrend::new(&multiply(&lower_inverse, trend))?;
+        let log_determinant = cholesky.log_determinant();
+        Some(Self { lower_inverse, q, r_inverse, log_determinant, log_information })
+    }
+
+    /// Returns `log |K| + log |F' K^-1 F|`.
+    pub fn determinants(&self) -> f64 {
+        self.log_determinant + self.log_information
+    }
+
+    /// Returns `N - p`.
+    pub fn free(&self) -> f64 {
+        (self.size() - self.terms()) as f64
     }
 
     /// Returns `N`.
@@ -85,14 +126,10 @@ impl Factor {
     /// Returns `P Y`, the trend's coefficients and the squares for scores `Y` (`N x C`).
     pub fn weights(&self, scores: &Matrix) -> Weights {
         let (white, along) = self.split(scores);
-        let mut squares = vec![0.0; scores.columns()];
-        for row in white.iter_rows() {
-            squares.iter_mut().zip(row).for_each(|(sum, w)| *sum += w * w);
-        }
         Weights {
             alpha: transposed_multiply(&self.lower_inverse, &white),
             beta: multiply(&self.r_inverse, &along),
-            squares,
+            squares: column_squares(&white),
         }
     }
 
@@ -103,11 +140,7 @@ impl Factor {
 
     /// Returns `(I - Q Q') L^-1 Y` and `Q' L^-1 Y`.
     fn split(&self, scores: &Matrix) -> (Matrix, Matrix) {
-        let mut white = multiply(&self.lower_inverse, scores);
-        let along = transposed_multiply(&self.q, &white);
-        let fitted = multiply(&self.q, &along);
-        white.as_mut_slice().iter_mut().zip(fitted.as_slice()).for_each(|(w, f)| *w -= f);
-        (white, along)
+        without(&self.q, multiply(&self.lower_inverse, scores))
     }
 
     /// Returns `B` with `K^-1 F (F' K^-1 F)^-1 F' K^-1 = B B'` (`N x p`).

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::factor::{Factor, Weights};
 use super::kernel::Kernel;
 use super::likelihood::{Hyperparameters, measured, restricted};
+use super::nearest::{Conditioned, Near, Restored};
 
 /// Choices that define a field; the rest follows from the runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,6 +20,9 @@ pub struct Choice {
     pub length_scales: Vec<f64>,
     /// Variance of the noise as a fraction of the variance of the process.
     pub nugget: f64,
+    /// Number of neighbours of a run in the approximation for many runs; `None` for the exact process.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub neighbours: Option<usize>,
 }
 
 /// The runs as used by the fields.
@@ -42,7 +46,7 @@ pub struct Field {
     pub nugget: f64,
     /// Runs in units of the length scales, one run per column.
     points: Matrix,
-    factor: Factor,
+    runs: Conditioning,
     /// `alpha` (`components x runs`) and `beta` (`components x terms`), one component per row.
     alpha: Matrix,
     beta: Matrix,
@@ -52,33 +56,86 @@ pub struct Field {
     pub log_likelihood: f64,
 }
 
+/// The means by which errors follow from the runs.
+#[derive(Debug, Clone, PartialEq)]
+enum Conditioning {
+    /// Factors of all runs.
+    All(Factor),
+    /// Nearest runs.
+    Near(Near),
+}
+
 impl Field {
     /// Conditions the processes on the runs; `None` if the covariance cannot be factored or the runs do not determine
     /// the trend.
     pub fn new(kernel: Kernel, choice: Choice, runs: Runs<'_>) -> Option<Self> {
         let points = measured(runs.points, &choice.length_scales);
         let trend = runs.regressors.select_columns(&choice.terms);
+        let scores = runs.scores.select_columns(&choice.components);
+        if let Some(neighbours) = choice.neighbours {
+            let both = [&trend, &scores];
+            let (near, found) = Near::new(kernel, &points, choice.nugget, both, neighbours)?;
+            return Self::nearby(kernel, choice, points, near, found);
+        }
         let (covariance, _) = kernel.among(&points, choice.nugget);
         let (factor, jitter) = Factor::new(covariance, &trend)?;
         if factor.size() <= factor.terms() {
             return None;
         }
-        let Weights { alpha, beta, squares } =
-            factor.weights(&runs.scores.select_columns(&choice.components));
-        let (log_likelihood, variances) = restricted(&factor, &squares);
+        let Weights { alpha, beta, squares } = factor.weights(&scores);
+        let (log_likelihood, variances) =
+            restricted(factor.free(), factor.determinants(), &squares);
         let nugget = choice.nugget + jitter;
         let (alpha, beta) = (alpha.transposed(), beta.transposed());
-        Some(Self {
-            choice,
-            kernel,
-            nugget,
-            points,
-            factor,
-            alpha,
-            beta,
-            variances,
-            log_likelihood,
-        })
+        let runs = Conditioning::All(factor);
+        Some(Self { choice, kernel, nugget, points, runs, alpha, beta, variances, log_likelihood })
+    }
+
+    /// Restores processes of many runs from what was found before; `None` if the parts do not fit.
+    pub fn restored(
+        kernel: Kernel,
+        choice: Choice,
+        runs: Runs<'_>,
+        found: Conditioned,
+    ) -> Option<Self> {
+        let points = measured(runs.points, &choice.length_scales);
+        let trend = runs.regressors.select_columns(&choice.terms);
+        let near = Near::of(kernel, points.clone(), trend, &found, choice.neighbours?)?;
+        Self::nearby(kernel, choice, points, near, found)
+    }
+
+    fn nearby(
+        kernel: Kernel,
+        choice: Choice,
+        points: Matrix,
+        near: Near,
+        found: Conditioned,
+    ) -> Option<Self> {
+        let Conditioned { restored, alpha, precisions } = found;
+        let Restored { nugget, log_likelihood, variances, beta, .. } = restored;
+        let (components, terms) = (choice.components.len(), choice.terms.len());
+        let fits = beta.len() == components
+            && beta.iter().all(|row| row.len() == terms)
+            && variances.len() == components
+            && (alpha.rows(), alpha.columns()) == (components, points.columns())
+            && precisions.len() == points.columns();
+        let beta = Matrix::from_rows(terms, fits.then_some(beta)?);
+        let runs = Conditioning::Near(near);
+        Some(Self { choice, kernel, nugget, points, runs, alpha, beta, variances, log_likelihood })
+    }
+
+    /// Returns what [`Self::restored`] needs; `None` for exact processes, which are conditioned again.
+    pub fn found(&self) -> Option<Conditioned> {
+        let Conditioning::Near(near) = &self.runs else { return None };
+        let restored = Restored {
+            nugget: self.nugget,
+            log_likelihood: self.log_likelihood,
+            variances: self.variances.clone(),
+            beta: self.beta.iter_rows().map(<[f64]>::to_vec).collect(),
+            r_inverse: near.root(),
+        };
+        let (alpha, precisions) = (self.alpha.clone(), near.diagonal().to_vec());
+        Some(Conditioned { restored, alpha, precisions })
     }
 
     /// Returns the mean of each component (`points x components`) at points in standard variables (one per column)
@@ -88,29 +145,42 @@ impl Field {
     /// involve cancellation.
     pub fn mean(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
         let place = measured(points, &self.choice.length_scales);
-        let above = self.kernel.above_one(&place, &self.points);
+        let process = match &self.runs {
+            Conditioning::All(_) => {
+                multiply_each(&self.kernel.above_one(&place, &self.points), &self.alpha)
+            }
+            Conditioning::Near(near) => near.process(&place, &self.alpha),
+        };
         let trend = regressors.select_columns(&self.choice.terms);
         let ones: Vec<f64> = self.alpha.iter_rows().map(|alpha| alpha.iter().sum()).collect();
         Matrix::from_fn(points.columns(), ones.len(), |i, c| {
-            let process = dot(above.row(i), self.alpha.row(c)) + ones[c];
-            process + dot(trend.row(i), self.beta.row(c))
+            process[(i, c)] + ones[c] + dot(trend.row(i), self.beta.row(c))
         })
     }
 
     /// Returns the variance of a new run's score about the mean (`points x components`), including the uncertainty of
     /// the trend: `s^2 (1 + nugget - k' K^-1 k + u' (F' K^-1 F)^-1 u)` with `u = f - F' K^-1 k`.
     pub fn variance(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
-        let white = multiply_transposed(&self.correlations(points), &self.factor.lower_inverse);
         let trend = regressors.select_columns(&self.choice.terms);
-        let own = multiply(&trend, &self.factor.r_inverse);
-        let shared = multiply(&white, &self.factor.q);
+        let shares = match &self.runs {
+            Conditioning::All(factor) => self.shares(factor, points, &trend),
+            Conditioning::Near(near) => {
+                near.variance(&measured(points, &self.choice.length_scales), &trend)
+            }
+        };
+        Matrix::from_fn(shares.len(), self.variances.len(), |i, c| self.variances[c] * shares[i])
+    }
+
+    fn shares(&self, factor: &Factor, points: &Matrix, trend: &Matrix) -> Vec<f64> {
+        let white = multiply_transposed(&self.correlations(points), &factor.lower_inverse);
+        let own = multiply(trend, &factor.r_inverse);
+        let shared = multiply(&white, &factor.q);
         let share = |i: usize| {
             let known = dot(white.row(i), white.row(i));
             let unknown = own.row(i).iter().zip(shared.row(i)).map(|(a, b)| (a - b) * (a - b));
             (1.0 + self.nugget - known).max(0.0) + unknown.sum::<f64>()
         };
-        let shares: Vec<f64> = (0..points.columns()).map(share).collect();
-        Matrix::from_fn(shares.len(), self.variances.len(), |i, c| self.variances[c] * shares[i])
+        (0..points.columns()).map(share).collect()
     }
 
     /// Returns the covariances of the errors of the first component among points (`points x points`), including the
@@ -124,10 +194,16 @@ impl Field {
     /// Returns the covariances of [`Self::covariance`] for a process of variance one; those of a component are its variance
     /// times these.
     pub fn shared_covariance(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
-        let white = multiply_transposed(&self.correlations(points), &self.factor.lower_inverse);
         let trend = regressors.select_columns(&self.choice.terms);
-        let mut unknown = multiply(&trend, &self.factor.r_inverse);
-        let shared = multiply(&white, &self.factor.q);
+        let factor = match &self.runs {
+            Conditioning::All(factor) => factor,
+            Conditioning::Near(near) => {
+                return near.covariance(&measured(points, &self.choice.length_scales), &trend);
+            }
+        };
+        let white = multiply_transposed(&self.correlations(points), &factor.lower_inverse);
+        let mut unknown = multiply(&trend, &factor.r_inverse);
+        let shared = multiply(&white, &factor.q);
         for (a, b) in unknown.as_mut_slice().iter_mut().zip(shared.as_slice()) {
             *a -= b;
         }
@@ -157,24 +233,34 @@ impl Field {
 
     /// Returns the leave-one-out residuals of the scores (`runs x components`), with the hyperparameters kept and the
     /// trend refitted: `(P y)_i / P_ii` (Dubrule 1983; Rasmussen and Williams 2006, equation 5.12).
+    ///
+    /// With many runs `P_ii` follows from the variance of a run given its nearest others, which is an upper bound, so
+    /// that the residuals are too large rather than too small.
     pub fn left_out(&self) -> Matrix {
-        // If a run alone determines a term of the trend, `P_ii` is zero: the other runs cannot predict it. The floor
-        // keeps the residual finite.
-        let precisions: Vec<f64> =
-            self.factor.precisions().into_iter().map(|(p, k)| p.max(1e-13 * k)).collect();
+        let precisions = self.precisions();
         Matrix::from_fn(precisions.len(), self.alpha.rows(), |i, c| {
             self.alpha[(c, i)] / precisions[i]
         })
     }
 
+    /// Returns the diagonal of `P`.
+    fn precisions(&self) -> Vec<f64> {
+        match &self.runs {
+            // If a run alone determines a term of the trend, `P_ii` is zero: the other runs cannot predict it. The
+            // floor keeps the residual finite.
+            Conditioning::All(factor) => {
+                factor.precisions().into_iter().map(|(p, k)| p.max(1e-13 * k)).collect()
+            }
+            Conditioning::Near(near) => near.diagonal().to_vec(),
+        }
+    }
+
     /// Returns the mean square of the leave-one-out residuals of the first component in units of their own standard
     /// deviations `s / sqrt(P_ii)`; above one for a process that is too sure of itself.
     pub fn left_out_ratio(&self) -> f64 {
-        let precisions = self.factor.precisions();
+        let precisions = self.precisions();
         let n = precisions.len() as f64;
-        let square = |(i, (p, k)): (usize, &(f64, f64))| {
-            self.alpha[(0, i)].powi(2) / (p.max(1e-13 * k) * self.variances[0])
-        };
+        let square = |(i, p): (usize, &f64)| self.alpha[(0, i)].powi(2) / (p * self.variances[0]);
         precisions.iter().enumerate().map(square).sum::<f64>() / n
     }
 
@@ -194,10 +280,15 @@ impl Field {
     }
 }
 
+/// Returns the inner products of all rows of one matrix with all of another, each computed alone.
+fn multiply_each(a: &Matrix, b: &Matrix) -> Matrix {
+    Matrix::from_fn(a.rows(), b.rows(), |i, j| dot(a.row(i), b.row(j)))
+}
+
 impl Choice {
     /// Returns the choice with these hyperparameters.
     pub fn new(components: Vec<usize>, terms: Vec<usize>, found: Hyperparameters) -> Self {
         let Hyperparameters { length_scales, nugget } = found;
-        Self { components, terms, length_scales, nugget }
+        Self { components, terms, length_scales, nugget, neighbours: None }
     }
 }

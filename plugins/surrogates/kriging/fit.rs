@@ -12,9 +12,9 @@ use super::emulator::{Kriging, condition};
 use super::field::{Choice, Field, Runs};
 use super::kernel::Kernel;
 use super::likelihood::Restricted;
-use super::options::{Bounds, LengthScales, Nugget};
+use super::options::{Approximation, Bounds, LengthScales, Nugget};
 use super::regressors::Regressors;
-use super::search::search;
+use super::search::{search, search_nearby};
 use super::standard::{Standard, standardised};
 use crate::surrogates::polynomial_chaos::check_numbers;
 use crate::surrogates::principal_components::{Components, PrincipalComponents};
@@ -30,6 +30,8 @@ pub struct Settings {
     pub length_scales: LengthScales,
     /// Noise of the runs.
     pub nugget: Nugget,
+    /// Covariance of all runs, or of neighbours.
+    pub approximation: Approximation,
     /// Reduction of the outputs to components.
     pub components: Components,
     /// Number of starts of the search.
@@ -61,7 +63,7 @@ const ROUND_OFF: f64 = 1e-13;
 impl Settings {
     /// Reports invalid options, and designs for which no standard variable exists.
     pub fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        for (key, message) in self.faults() {
+        for (key, message) in self.faults(context.runs) {
             complaints.at(key).say(message);
         }
         for message in context.parameters.iter().filter_map(|p| Standard::of(p).err()) {
@@ -69,11 +71,12 @@ impl Settings {
         }
     }
 
-    /// Returns what is wrong with the settings: the option, and a description.
-    fn faults(&self) -> Vec<(&'static str, String)> {
+    /// Returns what is wrong with the settings for this number of runs: the option, and a description.
+    fn faults(&self, runs: Option<usize>) -> Vec<(&'static str, String)> {
         let mut faults = self.bounds.faults();
         faults.extend(self.components.fault().map(|words| ("components", words)));
         faults.extend(self.nugget.fault().map(|words| ("nugget", words)));
+        faults.extend(self.approximation.fault(runs).map(|words| ("approximation", words)));
         if self.starts == 0 {
             faults.push(("starts", "the search needs at least one start".to_owned()));
         }
@@ -89,7 +92,7 @@ impl Settings {
         progress: &Progress<'_>,
     ) -> Result<Kriging, Stop> {
         check_numbers(training)?;
-        if let Some((key, message)) = self.faults().into_iter().next() {
+        if let Some((key, message)) = self.faults(Some(training.points.rows())).into_iter().next() {
             return Err(Stop::new(format!("`surrogate.{key}`: {message}")));
         }
         let standards = standards(training)?;
@@ -195,8 +198,12 @@ impl Settings {
             bounds: self.bounds,
             nugget: self.nugget,
         };
-        let found = search(&problem, self.starts, stream)?;
-        Some(Choice::new(components, terms, found))
+        let neighbours = self.approximation.neighbours(runs.scores.rows());
+        let found = match neighbours {
+            None => search(&problem, self.starts, stream)?,
+            Some(count) => search_nearby(&problem, count, self.starts, stream)?,
+        };
+        Some(Choice { neighbours, ..Choice::new(components, terms, found) })
     }
 }
 

@@ -35,7 +35,7 @@ impl Kernel {
 
     /// Replaces squared distances `r^2` by correlations `c(r)`, and fills `slopes` with `-c'(r) / r`: the derivative
     /// with respect to the logarithm of a length scale, divided by that coordinate's contribution to `r^2`.
-    fn evaluate(self, squares: &mut [f64], slopes: &mut [f64]) {
+    pub(super) fn evaluate(self, squares: &mut [f64], slopes: &mut [f64]) {
         let rate = match self {
             Self::Matern52 => 5.0,
             Self::Matern32 => 3.0,

@@ -68,7 +68,7 @@ impl Restricted<'_> {
         let Some((factor, _)) = Factor::new(covariance, self.trend) else {
             return f64::NEG_INFINITY;
         };
-        restricted(&factor, &factor.weights(self.scores).squares).0
+        restricted(factor.free(), factor.determinants(), &factor.weights(self.scores).squares).0
     }
 
     /// Returns the log-likelihood and its derivatives; `None` if the covariance cannot be factored.
@@ -78,7 +78,7 @@ impl Restricted<'_> {
         let (covariance, slopes) = self.kernel.among(&points, nugget);
         let (factor, _) = Factor::new(covariance, self.trend)?;
         let weights = factor.weights(self.scores);
-        let (value, variances) = restricted(&factor, &weights.squares);
+        let (value, variances) = restricted(factor.free(), factor.determinants(), &weights.squares);
         // A fixed nugget has no derivative.
         let moved = Moved { points: &points, slopes: &slopes, alpha: weights.alpha.transposed() };
         let (gradient, pulls) =
@@ -101,14 +101,31 @@ pub struct Slopes {
     pub information: Matrix,
 }
 
-/// Returns the restricted log-likelihood and the estimates of the variances `s_c^2`; `squares` is the diagonal of
-/// `Y' P Y`.
-pub fn restricted(factor: &Factor, squares: &[f64]) -> (f64, Vec<f64>) {
-    let free = (factor.size() - factor.terms()) as f64;
+/// Returns the restricted log-likelihood and the estimates of the variances `s_c^2`: `free` is `N - p`, `determinants`
+/// `log |K| + log |F' K^-1 F|`, `squares` the diagonal of `Y' P Y`.
+pub fn restricted(free: f64, determinants: f64, squares: &[f64]) -> (f64, Vec<f64>) {
     let variances: Vec<f64> = squares.iter().map(|s| (s / free).max(ROUND_OFF)).collect();
-    let determinants = factor.log_determinant + factor.log_information;
     let each = |v: &f64| free * (1.0 + (TAU * v).ln()) + determinants;
     (-0.5 * variances.iter().map(each).sum::<f64>(), variances)
+}
+
+/// Density of hyperparameters with the information that scoring needs.
+pub trait Scored: Target {
+    /// Returns the log-likelihood and its derivatives; `None` if the covariance cannot be factored.
+    fn slopes(&self, point: &[f64]) -> Option<Slopes>;
+
+    /// Number of length scales; the coordinate after theirs is the logarithm of the nugget.
+    fn length_scales(&self) -> usize;
+}
+
+impl Scored for Restricted<'_> {
+    fn slopes(&self, point: &[f64]) -> Option<Slopes> {
+        Restricted::slopes(self, point)
+    }
+
+    fn length_scales(&self) -> usize {
+        self.points.rows()
+    }
 }
 
 /// Derivatives of a covariance with respect to its hyperparameters.

@@ -16,6 +16,48 @@ pub enum LengthScales {
     Shared,
 }
 
+/// Covariance of the runs: that of all of them, or that of each with its nearest ones.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "snake_case")]
+pub enum Approximation {
+    /// Exact with at most 2000 runs, 100 neighbours with more.
+    #[default]
+    Automatic,
+    /// All covariances. The time grows with the cube of the number of runs and the memory with its square: 10,000 runs
+    /// need 800 MB for each matrix.
+    Exact,
+    /// Number of nearest runs on which each run's density is conditioned, at least 1 and below the number of runs, such
+    /// as `{ neighbours = 50 }`. More are more accurate, which matters most for smooth responses without noise; the time
+    /// grows with their cube.
+    Neighbours(usize),
+}
+
+impl Approximation {
+    /// Number of runs up to which the automatic choice is exact.
+    const EXACT: usize = 2000;
+    /// Number of neighbours above it.
+    const USUAL: usize = 100;
+
+    /// Returns the number of neighbours with this number of runs; `None` for the exact covariance.
+    pub fn neighbours(self, runs: usize) -> Option<usize> {
+        match self {
+            Self::Automatic => (runs > Self::EXACT).then_some(Self::USUAL),
+            Self::Exact => None,
+            Self::Neighbours(count) => Some(count),
+        }
+    }
+
+    /// Returns what is wrong with the choice for this number of runs, if that is known.
+    pub fn fault(self, runs: Option<usize>) -> Option<String> {
+        let Self::Neighbours(count) = self else { return None };
+        if count == 0 {
+            return Some("the number of neighbours must be at least 1".to_owned());
+        }
+        let runs = runs.filter(|runs| count >= *runs)?;
+        Some(format!("each run has {count} neighbours, but there are {runs} runs in all"))
+    }
+}
+
 /// Variance of the noise of the runs, as a fraction of the variance of the process: `"estimated"`, or a number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]

@@ -1,13 +1,10 @@
 //! Scoring: maximisation by the information of the likelihood.
 
-use lacuna::plugin::Target;
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix, multiply_vector};
 
-use super::likelihood::{Restricted, Slopes};
+use super::likelihood::{Scored, Slopes};
 
-/// Minimum gain in log-likelihood that the quadratic model must predict for a step.
-const GAIN: f64 = 1e-4;
 /// Longest steps in the logarithms of a length scale and of the nugget; the nugget often has far to go.
 const LONGEST: [f64; 2] = [1.0, 10.0];
 /// Maximum number of likelihood evaluations, which dominate the cost.
@@ -16,15 +13,15 @@ const MOST: usize = 40;
 const MEMORY: usize = 4;
 
 /// Returns the local maximum reached from a point, and whether the search converged; `None` if the point has no
-/// likelihood.
+/// likelihood. The search ends where no step is predicted to gain more than `gain` in log-likelihood.
 ///
 /// The steps are those of Newton's method with the average information in place of the Hessian (Gilmour, Thompson and
 /// Cullis 1995), which costs little more than the gradient. The response of a simulator is not a realisation of the
 /// process, so that the information is wrong by factors; the changes of the gradient along the last steps correct it
 /// (BFGS). Steps are damped (Levenberg-Marquardt) until the likelihood increases; coordinates that are pressed
 /// against a bound stay there.
-pub fn score(problem: &Restricted<'_>, start: &[f64]) -> Option<(Vec<f64>, bool)> {
-    let bounds = Target::bounds(problem);
+pub fn score(problem: &impl Scored, start: &[f64], gain: f64) -> Option<(Vec<f64>, bool)> {
+    let bounds = problem.bounds();
     let mut point = start.to_vec();
     let mut here = problem.slopes(&point)?;
     let mut steps: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
@@ -32,11 +29,11 @@ pub fn score(problem: &Restricted<'_>, start: &[f64]) -> Option<(Vec<f64>, bool)
     for _ in 0..MOST {
         let curvature = corrected(&here.information, &steps);
         let free = free(&point, &here.gradient, &bounds);
-        let longest = |j: usize| LONGEST[usize::from(j == problem.points.rows())];
+        let longest = |j: usize| LONGEST[usize::from(j == problem.length_scales())];
         let place = Place { point: &point, here: &here, curvature: &curvature, free: &free };
         let Some(next) = place.step(&bounds, damping, longest) else { break };
         let promise = place.promise(&next);
-        if promise < GAIN {
+        if promise < gain {
             // A step limited by a bound says nothing about what the other coordinates could gain.
             let cut = (next.iter().zip(&point).zip(&bounds))
                 .any(|((x, y), (low, high))| x != y && (x <= low || x >= high));

@@ -11,7 +11,8 @@ use super::likelihood::{Restricted, measured};
 use super::options::{Bounds, Nugget};
 use crate::surrogates::gaussian_process::tests::recurrence;
 
-const KERNELS: [Kernel; 3] = [Kernel::Matern52, Kernel::Matern32, Kernel::SquaredExponential];
+pub(super) const KERNELS: [Kernel; 3] =
+    [Kernel::Matern52, Kernel::Matern32, Kernel::SquaredExponential];
 
 /// Returns the inverse by Gauss-Jordan elimination with pivoting, and the logarithm of the absolute determinant.
 fn inverse(a: &Matrix) -> (Matrix, f64) {
@@ -46,15 +47,15 @@ fn inverse(a: &Matrix) -> (Matrix, f64) {
 }
 
 /// Runs of two parameters with a linear trend and three components.
-struct Sample {
+pub(super) struct Sample {
     /// One run per column.
-    points: Matrix,
-    regressors: Matrix,
-    scores: Matrix,
+    pub points: Matrix,
+    pub regressors: Matrix,
+    pub scores: Matrix,
 }
 
 impl Sample {
-    fn new(runs: usize) -> Self {
+    pub fn new(runs: usize) -> Self {
         let points = recurrence(0, runs, 2).transposed();
         let at = |i: usize| (points[(0, i)], points[(1, i)]);
         let regressors = trend(&points);
@@ -65,28 +66,29 @@ impl Sample {
         Self { points, regressors, scores }
     }
 
-    fn problem(&self, kernel: Kernel) -> Restricted<'_> {
+    pub fn problem(&self, kernel: Kernel) -> Restricted<'_> {
         let Self { points, regressors, scores } = self;
         let (bounds, nugget) = (Bounds::default(), Nugget::default());
         Restricted { kernel, points, trend: regressors, scores, bounds, nugget }
     }
 
-    fn runs(&self) -> Runs<'_> {
+    pub fn runs(&self) -> Runs<'_> {
         let Self { points, regressors, scores } = self;
         Runs { points, regressors, scores }
     }
 }
 
-fn trend(points: &Matrix) -> Matrix {
+pub(super) fn trend(points: &Matrix) -> Matrix {
     Matrix::from_fn(points.columns(), 3, |i, j| if j == 0 { 1.0 } else { points[(j - 1, i)] })
 }
 
-fn choice() -> Choice {
+pub(super) fn choice() -> Choice {
     Choice {
         components: vec![0, 1, 2],
         terms: vec![0, 1, 2],
         length_scales: vec![0.4, 0.7],
         nugget: 1e-3,
+        neighbours: None,
     }
 }
 
@@ -118,7 +120,7 @@ impl Textbook {
     }
 }
 
-fn close(found: f64, expected: f64, tolerance: f64) {
+pub(super) fn close(found: f64, expected: f64, tolerance: f64) {
     let scale = expected.abs().max(1.0);
     assert!((found - expected).abs() <= tolerance * scale, "{found} and not {expected}");
 }
@@ -310,6 +312,7 @@ fn figures_are_those_of_a_peer() {
             terms: Vec::new(),
             length_scales: vec![0.4, 0.7],
             nugget: 1e-4,
+            neighbours: None,
         };
         let runs = Runs { points: &points, regressors: &none, scores: &scores };
         let field = Field::new(kernel, choice, runs).unwrap();

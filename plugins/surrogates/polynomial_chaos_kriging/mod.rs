@@ -14,7 +14,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::kriging::{
-    Bounds, Kernel, Kriging, LengthScales, Nugget, Regressors, Settings, Standard, Trends,
+    Approximation, Bounds, Kernel, Kriging, LengthScales, Nugget, Regressors, Settings, Standard,
+    Trends,
 };
 use super::polynomial_chaos::{Basis, Expansion, PolynomialChaos};
 use super::principal_components::Components;
@@ -31,7 +32,8 @@ use super::principal_components::Components;
 /// process (universal kriging), whose length scales and nugget maximise the restricted likelihood, as in
 /// `gaussian_process`. With `selection = "optimal"` the largest half of the polynomials, the largest quarter, and so
 /// on down to the constant alone are tried too, and the smallest leave-one-out error (corrected for the number of
-/// terms) decides; the constant alone is ordinary kriging.
+/// terms) decides; the constant alone is ordinary kriging. With more than 2000 runs the processes are approximated as in
+/// `gaussian_process` (`approximation`).
 ///
 /// References: Schöbi, Sudret and Wiart, *Polynomial-chaos-based Kriging*, International Journal for Uncertainty
 /// Quantification 5 (2015) 171; those of `polynomial_chaos` and `gaussian_process`.
@@ -47,6 +49,9 @@ pub struct PolynomialChaosKriging {
     /// Variance of the noise of the runs (the deviation from a smooth response), as a fraction of the variance of the
     /// process: a number, or `"estimated"`.
     pub nugget: Nugget,
+    /// Covariance of the runs: `"exact"`, or `{ neighbours = 100 }` for that of each run with its nearest ones, whose
+    /// cost is about linear in the number of runs; `"automatic"` is exact with at most 2000 runs.
+    pub approximation: Approximation,
     /// Principal components of the outputs: as many as carry a fraction of the variance, `{ variance = 0.99999 }`, or
     /// `{ count = 20 }`; `"none"` gives every output a process of its own.
     pub components: Components,
@@ -76,6 +81,7 @@ impl Default for PolynomialChaosKriging {
             selection: Selection::default(),
             kernel: Kernel::default(),
             nugget: Nugget::default(),
+            approximation: Approximation::default(),
             components: Components::Variance(0.99999),
             starts: 4,
             bounds: Bounds::default(),
@@ -92,6 +98,7 @@ impl PolynomialChaosKriging {
             kernel: self.kernel,
             length_scales: LengthScales::Each,
             nugget: self.nugget,
+            approximation: self.approximation,
             components: self.components,
             starts: self.starts,
             bounds: self.bounds,
