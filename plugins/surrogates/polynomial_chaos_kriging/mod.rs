@@ -49,8 +49,8 @@ pub struct PolynomialChaosKriging {
     /// Variance of the noise of the runs (the deviation from a smooth response), as a fraction of the variance of the
     /// process: a number, or `"estimated"`.
     pub nugget: Nugget,
-    /// Covariance of the runs: `"exact"`, or `{ neighbours = 100 }` for that of each run with its nearest ones, whose
-    /// cost is about linear in the number of runs; `"automatic"` is exact with at most 2000 runs.
+    /// Covariance of the runs: `"exact"`, or `{ neighbours = 100 }` for that of each run with its nearest ones, which
+    /// takes less time and memory with many runs; `"automatic"` is exact with at most 2000 runs.
     pub approximation: Approximation,
     /// Principal components of the outputs: as many as carry a fraction of the variance, `{ variance = 0.99999 }`, or
     /// `{ count = 20 }`; `"none"` gives every output a process of its own.

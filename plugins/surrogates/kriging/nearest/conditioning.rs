@@ -302,7 +302,9 @@ impl Near {
         }
         let mut terms: Vec<Vec<(usize, f64)>> = vec![Vec::new(); n];
         for (s, list) in users.iter().enumerate() {
-            list.iter().for_each(|&(i, weight)| terms[i].push((s, weight)));
+            for &(i, weight) in list {
+                terms[i].push((s, weight));
+            }
         }
         let indices: Vec<usize> = used.iter().map(|&run| run as usize).collect();
         let points = self.points.select_columns(&indices);
@@ -327,7 +329,9 @@ impl Near {
         };
         let parts: Vec<Matrix> = (0..PARTS).into_par_iter().map(part).collect();
         let mut all = Matrix::zeros(n, n);
-        parts.iter().for_each(|sum| add_scaled(all.as_mut_slice(), 1.0, sum.as_slice()));
+        for sum in &parts {
+            add_scaled(all.as_mut_slice(), 1.0, sum.as_slice());
+        }
         all
     }
 }

@@ -137,7 +137,7 @@ fn duplicates_do_not_break_it() {
     let trial = Trial::at(points, f);
     for nugget in [Nugget::default(), Nugget::Fixed(0.0)] {
         let plugin =
-            |approximation| GaussianProcess { approximation, nugget, ..GaussianProcess::default() };
+            |approximation| GaussianProcess { nugget, approximation, ..GaussianProcess::default() };
         let found = trial.fit_with(&plugin(Approximation::Neighbours(30)));
         let exact = trial.fit_with(&plugin(Approximation::Exact));
         let (a, b) = (trial.error(&found), trial.error(&exact));
