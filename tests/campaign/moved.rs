@@ -29,10 +29,13 @@ fn until_done(command: &mut Command, folder: &Path, count: usize, begun: &str) {
     child.wait().unwrap();
 }
 
-/// Copies the campaign's folder, with the runs that may end in the copy.
+/// Copies the campaign's folder, with the runs that may end in the copy. Jobs on the cluster go on while it is copied, and a
+/// file that one of them renames meanwhile is sought in vain: then it is copied again.
 fn copied(folder: &Path, copy: &Path, permitted: &str) -> PathBuf {
-    let done = Command::new("cp").arg("-r").arg(folder).arg(copy).status().unwrap();
-    assert!(done.success());
+    wait_for("a copy", || {
+        let _ = fs::remove_dir_all(copy);
+        Command::new("cp").arg("-r").arg(folder).arg(copy).status().unwrap().success()
+    });
     fs::write(copy.join("permitted"), permitted).unwrap();
     copy.to_owned()
 }
