@@ -28,7 +28,7 @@ pub fn interpreter(path: &Path, directory: &Path) -> Option<PathBuf> {
 }
 
 /// Lets a process that computes with large arrays keep the memory that it frees: under the C library of GNU each array above
-/// some MB is otherwise asked of the system and returned to it, and its pages are cleared each time, which takes NumPy as long
+/// some MB is otherwise asked of the system and returned to it, and its pages are cleared each time, which takes `NumPy` as long
 /// as the sums themselves. Variables that are set already keep their values.
 pub fn keep_freed_memory(command: &mut Command) {
     for name in ["MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"] {
