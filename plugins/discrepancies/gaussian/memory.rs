@@ -15,7 +15,8 @@ type Place = Arc<OnceLock<Option<Arc<Directions>>>>;
 pub(super) struct Memory(Mutex<Vec<(Vec<f64>, Place)>>);
 
 impl Memory {
-    /// The directions for these weights, which `make` computes if they are new.
+    /// The directions for these weights, which `make` computes if they are new. A thread that needs them meanwhile waits, so
+    /// `make` must not wait for other threads: decompositions run on one.
     pub fn directions(
         &self,
         weights: &[f64],
