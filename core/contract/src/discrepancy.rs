@@ -181,6 +181,20 @@ fn knows_its_derivatives(likelihood: &dyn Likelihood) -> Result<(), String> {
     agree("the derivative by hyperparameter", &by_hyper, &differences, 1e-5)
 }
 
+/// Each value's density given all others, and the data without it, in the order of the data.
+fn without_each(data: &Measurements, given: &[f64]) -> Vec<(f64, Measurements)> {
+    let mut next = given.iter();
+    let mut all = Vec::new();
+    for (r, replicate) in data.replicates.iter().enumerate() {
+        for i in (0..OUTPUTS).filter(|&i| replicate.values[i].is_some()) {
+            let mut less = data.clone();
+            less.replicates[r].values[i] = None;
+            all.push((next.next().copied().unwrap_or(f64::NAN), less));
+        }
+    }
+    all
+}
+
 /// The likelihood of other data is comparable only if it has the same distribution: a discrepancy may estimate
 /// variances from the data, which its predictions then show.
 fn leaves_values_out(discrepancy: &dyn Discrepancy) -> Result<(), String> {
@@ -201,23 +215,17 @@ fn leaves_values_out(discrepancy: &dyn Discrepancy) -> Result<(), String> {
     };
     let (law, value) = (total(&*whole), whole.log_likelihood(&truth, &hyper));
     let (mut densities, mut quotients) = (Vec::new(), Vec::new());
-    let mut next = given.iter();
-    for (r, replicate) in data.replicates.iter().enumerate() {
-        for i in (0..OUTPUTS).filter(|&i| replicate.values[i].is_some()) {
-            let density = next.next().copied().unwrap_or(f64::NAN);
-            let mut less = data.clone();
-            less.replicates[r].values[i] = None;
-            let less = build(&less)?;
-            let same_names = || {
-                let names = |l: &dyn Likelihood| -> Vec<String> {
-                    l.hyperparameters().iter().map(|h| h.name.clone()).collect()
-                };
-                names(&*less) == names(&*whole)
+    for (density, less) in without_each(&data, &given) {
+        let less = build(&less)?;
+        let same_names = || {
+            let names = |l: &dyn Likelihood| -> Vec<String> {
+                l.hyperparameters().iter().map(|h| h.name.clone()).collect()
             };
-            if same_names() && agree("the law", &total(&*less), &law, 1e-9).is_ok() {
-                densities.push(density);
-                quotients.push(value - less.log_likelihood(&truth, &hyper));
-            }
+            names(&*less) == names(&*whole)
+        };
+        if same_names() && agree("the law", &total(&*less), &law, 1e-9).is_ok() {
+            densities.push(density);
+            quotients.push(value - less.log_likelihood(&truth, &hyper));
         }
     }
     agree("the density of value", &densities, &quotients, 1e-8)

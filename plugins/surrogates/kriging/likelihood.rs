@@ -219,6 +219,15 @@ pub fn measured(points: &Matrix, length_scales: &[f64]) -> Matrix {
     Matrix::from_fn(points.rows(), points.columns(), |k, i| points[(k, i)] / length_scales[k])
 }
 
+/// Returns the log-likelihood and its gradient by this number of hyperparameters: minus infinity and zero where the
+/// covariance cannot be factored.
+pub fn value_and_gradient(slopes: Option<Slopes>, count: usize) -> (f64, Vec<f64>) {
+    match slopes {
+        Some(slopes) => (slopes.value, slopes.gradient),
+        None => (f64::NEG_INFINITY, vec![0.0; count]),
+    }
+}
+
 impl Target for Restricted<'_> {
     fn dimension(&self) -> usize {
         self.points.rows() + usize::from(matches!(self.nugget, Nugget::Estimated(_)))
@@ -233,10 +242,7 @@ impl Target for Restricted<'_> {
     }
 
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
-        match self.slopes(point) {
-            Some(slopes) => (slopes.value, slopes.gradient),
-            None => (f64::NEG_INFINITY, vec![0.0; point.len()]),
-        }
+        value_and_gradient(self.slopes(point), point.len())
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {

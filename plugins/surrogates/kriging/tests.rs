@@ -172,6 +172,26 @@ fn likelihood_and_information_are_those_of_the_textbook() {
     }
 }
 
+/// Compares value and gradient of a likelihood with differences of its values, to the fourth order in their step.
+pub(super) fn has_the_gradient_of_differences(
+    likelihood: &dyn Target,
+    value: impl Fn(&[f64]) -> f64,
+    at: [f64; 3],
+) {
+    let (found, gradient) = likelihood.gradient(&at);
+    assert_eq!(found, value(&at));
+    for k in 0..3 {
+        let shifted = |by: f64| {
+            let mut point = at;
+            point[k] += by;
+            value(&point)
+        };
+        let difference =
+            (8.0 * (shifted(1e-3) - shifted(-1e-3)) - (shifted(2e-3) - shifted(-2e-3))) / 12e-3;
+        close(gradient[k], difference, 1e-7);
+    }
+}
+
 #[test]
 fn gradients_are_those_of_differences() {
     let sample = Sample::new(40);
@@ -180,19 +200,7 @@ fn gradients_are_those_of_differences() {
             let scores = sample.scores.select_columns(&components);
             let problem = Restricted { scores: &scores, ..sample.problem(kernel) };
             for at in [[-1.0, -0.3, -6.0], [-0.5, 0.4, -9.0], [-1.8, -1.5, -2.0]] {
-                let (value, gradient) = Target::gradient(&problem, &at);
-                assert_eq!(value, problem.value(&at));
-                for k in 0..3 {
-                    let shifted = |by: f64| {
-                        let mut point = at;
-                        point[k] += by;
-                        problem.value(&point)
-                    };
-                    let difference = (8.0 * (shifted(1e-3) - shifted(-1e-3))
-                        - (shifted(2e-3) - shifted(-2e-3)))
-                        / 12e-3;
-                    close(gradient[k], difference, 1e-7);
-                }
+                has_the_gradient_of_differences(&problem, |point| problem.value(point), at);
             }
         }
     }

@@ -37,7 +37,7 @@ mod terms;
 mod trend;
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 use lacuna::data::Parameter;
 use lacuna::math::random::Stream;

@@ -4,7 +4,7 @@ use lacuna::plugin::Discrepancy;
 use lacuna::plugin::discrepancy::Likelihood;
 use lacuna::run::Stop;
 
-use super::{OUTPUTS, UNMEASURED, common, data, known, start, truth};
+use super::{UNMEASURED, common, data, known, start, truth, without_each};
 use crate::judge::agree;
 
 /// The likelihood of a part of the data uses the distribution of all data, whatever the discrepancy estimates from
@@ -28,17 +28,11 @@ pub(super) fn stands_for_parts(discrepancy: &dyn Discrepancy) -> Result<(), Stri
     agree("the likelihood of all data as a part", &[of(&*same)], &[of(&*whole)], 1e-12)?;
     let Some(given) = whole.left_out(&truth, &hyper) else { return Ok(()) };
     let (mut densities, mut quotients) = (Vec::new(), Vec::new());
-    let mut next = given.iter();
-    for (r, replicate) in data.replicates.iter().enumerate() {
-        for i in (0..OUTPUTS).filter(|&i| replicate.values[i].is_some()) {
-            let density = next.next().copied().unwrap_or(f64::NAN);
-            let mut less = data.clone();
-            less.replicates[r].values[i] = None;
-            let part = discrepancy.likelihood_of_part(&known, &less).map_err(refused)?;
-            if let Some(part) = part {
-                densities.push(density);
-                quotients.push(of(&*whole) - of(&*part));
-            }
+    for (density, less) in without_each(&data, &given) {
+        let part = discrepancy.likelihood_of_part(&known, &less).map_err(refused)?;
+        if let Some(part) = part {
+            densities.push(density);
+            quotients.push(of(&*whole) - of(&*part));
         }
     }
     agree("the density of a value", &densities, &quotients, 1e-8)?;

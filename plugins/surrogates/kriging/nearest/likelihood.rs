@@ -7,7 +7,9 @@ use rayon::prelude::*;
 
 use super::super::factor::{JITTERS, WhiteTrend, column_squares, without};
 use super::super::kernel::Kernel;
-use super::super::likelihood::{Hyperparameters, Restricted, Scored, Slopes, measured, restricted};
+use super::super::likelihood::{
+    Hyperparameters, Restricted, Scored, Slopes, measured, restricted, value_and_gradient,
+};
 use super::order::Neighbours;
 use super::precision::{Block, CHUNK, Precision};
 
@@ -287,10 +289,7 @@ impl Target for Nearby<'_> {
     }
 
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
-        match self.slopes(point) {
-            Some(slopes) => (slopes.value, slopes.gradient),
-            None => (f64::NEG_INFINITY, vec![0.0; point.len()]),
-        }
+        value_and_gradient(self.slopes(point), point.len())
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {

@@ -6,7 +6,7 @@ mod behaviour;
 mod bench;
 mod components;
 mod families;
-mod functions;
+pub mod functions;
 mod gradients;
 mod laws;
 mod many_inputs;

@@ -2,27 +2,17 @@
 
 use std::f64::consts::PI;
 
+use crate::surrogates::polynomial_chaos::tests::functions;
+
 fn scaled<const D: usize>(u: &[f64], ranges: [[f64; 2]; D]) -> [f64; D] {
     std::array::from_fn(|k| ranges[k][0] + u[k] * (ranges[k][1] - ranges[k][0]))
 }
 
 /// Flow through a borehole (Harper and Gupta 1983; Morris, Mitchell and Ylvisaker 1993).
 pub fn borehole(u: &[f64]) -> f64 {
-    let [rw, r, tu, hu, tl, hl, l, kw] = scaled(
-        u,
-        [
-            [0.05, 0.15],
-            [100.0, 50_000.0],
-            [63_070.0, 115_600.0],
-            [990.0, 1110.0],
-            [63.1, 116.0],
-            [700.0, 820.0],
-            [1120.0, 1680.0],
-            [9855.0, 12_045.0],
-        ],
-    );
-    let log = (r / rw).ln();
-    2.0 * PI * tu * (hu - hl) / (log * (1.0 + 2.0 * l * tu / (log * rw * rw * kw) + tu / tl))
+    let function = functions::borehole();
+    let places = function.designs.iter().zip(u).map(|(design, u)| design.quantile(*u));
+    (function.value)(&places.collect::<Vec<f64>>())
 }
 
 /// Midpoint voltage of an output transformerless circuit (Ben-Ari and Steinberg 2007).

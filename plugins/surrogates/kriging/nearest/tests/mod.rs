@@ -4,12 +4,11 @@ mod cases;
 mod functions;
 
 use lacuna::math::random::{Stream, normal};
-use lacuna::plugin::Target;
 use lacuna_linalg::{Cholesky, Matrix, multiply, symmetric_eigen};
 
 use super::super::field::{Choice, Field, Runs};
 use super::super::likelihood::{Restricted, Scored, measured};
-use super::super::tests::{KERNELS, Sample, choice, close, trend};
+use super::super::tests::{KERNELS, Sample, choice, close, has_the_gradient_of_differences, trend};
 use super::*;
 use crate::surrogates::gaussian_process::tests::recurrence;
 
@@ -71,19 +70,7 @@ fn gradients_are_those_of_differences() {
             let whole = Restricted { scores: &scores, ..sample.problem(kernel) };
             let nearby = Nearby { whole, neighbours: &neighbours };
             for at in [AT, [-1.0, -0.3, -9.0], [-1.8, -1.5, -2.0]] {
-                let (value, gradient) = Target::gradient(&nearby, &at);
-                assert_eq!(value, nearby.value(&at));
-                for k in 0..3 {
-                    let shifted = |by: f64| {
-                        let mut point = at;
-                        point[k] += by;
-                        nearby.value(&point)
-                    };
-                    let difference = (8.0 * (shifted(1e-3) - shifted(-1e-3))
-                        - (shifted(2e-3) - shifted(-2e-3)))
-                        / 12e-3;
-                    close(gradient[k], difference, 1e-7);
-                }
+                has_the_gradient_of_differences(&nearby, |point| nearby.value(point), at);
                 let information = Scored::slopes(&nearby, &at).unwrap().information;
                 let eigen = symmetric_eigen(&information).unwrap();
                 assert!(eigen.values.iter().all(|v| *v > 0.0), "{:?}", eigen.values);
