@@ -119,6 +119,40 @@ fn equals_the_normal_density_written_out() {
     }
 }
 
+/// Without each replicate but the first, which alone measures every output: parts with numbers of replicates that are new,
+/// and those that came before. Several responses together have the bits of each alone.
+#[test]
+fn a_part_given_by_the_whole_has_the_density_written_out() {
+    for seed in 0..5 {
+        let data = data(seed);
+        let error = [common(seed + 100)];
+        for error in [&[][..], &error[..]] {
+            let whole = likelihood(&data, error);
+            let responses = random_matrix(20, OUTPUTS, seed + 200);
+            let hyper = Matrix::from_fn(20, 1, |i, _| 0.4 + 0.1 * i as f64);
+            for r in [1, 2, 3, 4, 1, 2, 3, 4] {
+                let mut part = data.clone();
+                part.replicates[r].values.fill(None);
+                let own = whole.of_part(&part).unwrap();
+                let together = own.log_likelihoods(&responses, &hyper);
+                for (i, found) in together.into_iter().enumerate() {
+                    let alone = own.log_likelihood(responses.row(i), hyper.row(i));
+                    assert_eq!(found.to_bits(), alone.to_bits());
+                    let expected = naive(&part, error, responses.row(i), hyper[(i, 0)]);
+                    assert!(
+                        (found - expected).abs() < 1e-10 * expected.abs(),
+                        "{found} {expected}"
+                    );
+                }
+            }
+            // Without the first, some outputs may have no value: another likelihood.
+            let mut few = data.clone();
+            few.replicates.iter_mut().for_each(|replicate| replicate.values[0] = None);
+            assert!(whole.of_part(&few).is_none());
+        }
+    }
+}
+
 #[test]
 fn the_compressed_form_equals_the_full_one() {
     for seed in 0..20 {
