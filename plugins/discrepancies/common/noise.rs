@@ -1,5 +1,7 @@
 //! Independent noise with a variance for each group of outputs.
 
+use std::sync::{Arc, OnceLock};
+
 use lacuna::data::{Measurements, Unit};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::discrepancy::{CommonError, ErrorPath, Hyperparameter, Known, VariancePart};
@@ -13,7 +15,9 @@ pub struct Setting {
     /// Measurements of the study.
     pub data: Measurements,
     /// Errors common to all replicates.
-    pub common: Vec<CommonError>,
+    pub common: Arc<[CommonError]>,
+    /// Those that a new replicate has, as parts of its variance; made when they are asked for.
+    common_parts: Arc<OnceLock<Vec<VariancePart>>>,
     /// Variance of each output stated by the data, or else the variance between replicates pooled over its group;
     /// `None` without either.
     replicated: Option<Vec<f64>>,
@@ -74,7 +78,7 @@ impl Noise {
 
     /// The noise of a part of the data in which no output is missing altogether.
     pub fn of_part(&self, part: &Measurements, replicates: &Replicates) -> Self {
-        let common = self.setting.common.clone();
+        let common = Arc::clone(&self.setting.common);
         let setting = Setting::with(part, common, replicates, &self.groups);
         Self { setting, ..self.clone() }
     }
@@ -107,12 +111,12 @@ impl Noise {
 impl Setting {
     /// Builds the setting; variances between replicates are pooled over these groups.
     pub fn new(known: &Known<'_>, replicates: &Replicates, groups: &Groups) -> Self {
-        Self::with(known.data, known.common.to_vec(), replicates, groups)
+        Self::with(known.data, known.common.into(), replicates, groups)
     }
 
     fn with(
         data: &Measurements,
-        common: Vec<CommonError>,
+        common: Arc<[CommonError]>,
         replicates: &Replicates,
         groups: &Groups,
     ) -> Self {
@@ -121,7 +125,7 @@ impl Setting {
         } else {
             Pooled::of(groups, replicates).by_output(groups)
         };
-        Self { data: data.clone(), common, replicated }
+        Self { data: data.clone(), common, common_parts: Arc::default(), replicated }
     }
 
     /// Splits the variance of a new replicate into parts: `measurement`, up to the variance that replicates show;
@@ -145,7 +149,9 @@ impl Setting {
 
     /// Returns the parts that are common errors of a new replicate.
     pub fn common_parts(&self) -> Vec<VariancePart> {
-        self.common.iter().filter(|error| error.predictive).map(CommonError::part).collect()
+        let all =
+            || self.common.iter().filter(|error| error.predictive).map(CommonError::part).collect();
+        self.common_parts.get_or_init(all).clone()
     }
 
     /// Returns one draw of the errors of a new replicate whose noise is independent and normal with these variances.

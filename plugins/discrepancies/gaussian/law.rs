@@ -119,7 +119,13 @@ impl Law {
         }
     }
 
-    /// Returns the variance of each group as pairs of values and probabilities.
+    /// Returns true if the variances depend on the response.
+    pub fn learns_variances(&self) -> bool {
+        matches!(self, Self::Integrated(_))
+    }
+
+    /// Returns the variance of each group as pairs of values and probabilities; the residuals have no effect unless the
+    /// variances are [learned](Self::learns_variances) from them.
     pub fn variances(
         &self,
         spreads: &[&Spread],

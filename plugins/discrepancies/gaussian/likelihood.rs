@@ -115,7 +115,7 @@ impl GaussianLikelihood {
 
     /// Returns the variance of each group given the response, as pairs of values and probabilities.
     fn variances(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<Vec<(f64, f64)>>> {
-        let split = self.split(response);
+        let split = if self.law.learns_variances() { self.split(response) } else { Vec::new() };
         self.law.variances(&self.spreads(), hyper, &residuals(&split))
     }
 

@@ -302,16 +302,20 @@ impl Work<'_> {
         let parts = if wanted * outputs > WHOLE { PARTS } else { 1 };
         let outputs: Vec<usize> = (0..outputs).collect();
         for part in outputs.chunks(outputs.len().div_ceil(parts).max(1)) {
+            let of_draw = |i: usize| -> Vec<f64> {
+                let point = chosen.row(i);
+                let variance = likelihood.predictive(&responses[i], &point[point.len() - own..]);
+                let variance = total(&variance);
+                part.iter().map(|&j| variance.get(j).map_or(0.0, |v| v.sqrt())).collect()
+            };
+            let sds: Vec<Vec<f64>> = (0..count).into_par_iter().map(of_draw).collect();
             let simulated: Vec<Vec<f64>> = noises
                 .par_iter_mut()
                 .enumerate()
                 .map(|(i, noise)| {
-                    let (response, point) = (&responses[i % count], chosen.row(i % count));
-                    let hyper = &point[point.len() - own..];
-                    let variance = total(&likelihood.predictive(response, hyper));
-                    let sd = |j: usize| variance.get(j).map_or(0.0, |v: &f64| v.sqrt());
-                    let datum = |&j: &usize| response[j] + sd(j) * normal(noise);
-                    part.iter().map(datum).collect()
+                    let (response, sd) = (&responses[i % count], &sds[i % count]);
+                    let datum = |(&j, sd): (&usize, &f64)| response[j] + sd * normal(noise);
+                    part.iter().zip(sd).map(datum).collect()
                 })
                 .collect();
             let ends = |j: usize| {
