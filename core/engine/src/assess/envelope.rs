@@ -78,10 +78,11 @@ pub fn outside(curve: &Beside) -> Option<Finding> {
     if let Some(finding) = other_size(curve) {
         return Some(finding);
     }
+    let own = size(&curve.data);
     let beyond = |&(&(y, error), &(low, high)): &(&(f64, f64), &(f64, f64))| {
         // Where the response of all runs is constant (before a wave arrives), their range is rounding error and says
         // nothing.
-        let slack = NOISES * error + 0.02 * (high - low) + 1e-3 * size(&curve.data);
+        let slack = NOISES * error + 0.02 * (high - low) + 1e-3 * own;
         y < low - slack || y > high + slack
     };
     let count = curve.data.iter().zip(&curve.runs).filter(beyond).count();

@@ -88,10 +88,6 @@ fn beside_runs(study: &Study, problem: &InverseProblem<'_>, data: &Observations)
         let common = if short { 0.0 } else { scatter(&summaries, &measured, own, answers()) };
         let error =
             |i: usize| own(i).unwrap_or(0.0).max(common) / (summaries[i].count as f64).sqrt();
-        let range = |&i: &usize| {
-            let column = answers().map(|row| row[i]);
-            column.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)))
-        };
         let size = |row: &[f64]| {
             let square: f64 = measured.iter().map(|&i| row[i] * row[i]).sum();
             (square / measured.len().max(1) as f64).sqrt()
@@ -99,11 +95,22 @@ fn beside_runs(study: &Study, problem: &InverseProblem<'_>, data: &Observations)
         envelope::outside(&Beside {
             name,
             data: measured.iter().map(|&i| (summaries[i].mean, error(i))).collect(),
-            runs: measured.iter().map(range).collect(),
+            runs: ranges(&measured, answers()),
             sizes: answers().map(size).collect(),
         })
     }));
     found
+}
+
+/// Smallest and largest response at some outputs.
+fn ranges<'r>(outputs: &[usize], runs: impl Iterator<Item = &'r [f64]>) -> Vec<(f64, f64)> {
+    let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); outputs.len()];
+    for run in runs {
+        for (range, &i) in ranges.iter_mut().zip(outputs) {
+            *range = (range.0.min(run[i]), range.1.max(run[i]));
+        }
+    }
+    ranges
 }
 
 /// Standard deviation that the values of a curve have in common: that between replicates, pooled over the curve; zero if the
