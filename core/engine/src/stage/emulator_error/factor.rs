@@ -47,17 +47,11 @@ pub struct Estimate {
 }
 
 impl<'a> Shifts<'a> {
-    /// Selects outputs and curves. `shapes` are the curves divided by their sizes, `noise` the variances of what was
-    /// measured, NaN where nothing was.
+    /// Selects outputs and curves, which are divided by their sizes; `noise` are the variances of what was measured, NaN
+    /// where nothing was.
     ///
     /// A subset of the outputs carries less information than all; their noise is reduced to compensate.
-    pub fn of(
-        curves: &'a Curves,
-        shapes: &Matrix,
-        size: &'a Size,
-        places: &'a Places,
-        noise: &[f64],
-    ) -> Self {
+    pub fn of(curves: &'a Curves, size: &'a Size, places: &'a Places, noise: &[f64]) -> Self {
         let measured: Vec<usize> = (0..noise.len()).filter(|&j| !noise[j].is_nan()).collect();
         let outputs: Vec<usize> =
             thinned(measured.len(), OUTPUTS).into_iter().map(|k| measured[k]).collect();
@@ -66,13 +60,13 @@ impl<'a> Shifts<'a> {
         let share = outputs.len() as f64 / measured.len().max(1) as f64;
         let noise: Vec<f64> = outputs.iter().map(|&j| (share * noise[j]).sqrt()).collect();
         let mut judged = Self { curves, size, places, outputs, noise, white: Matrix::zeros(0, 0) };
-        judged.white = judged.whitened(shapes);
+        judged.white = judged.whitened(|i, j| curves.errors[(i, j)] / size.at_curves[i]);
         judged
     }
 
-    fn whitened(&self, curves: &Matrix) -> Matrix {
-        Matrix::from_fn(curves.rows(), self.outputs.len(), |i, k| {
-            curves[(i, self.outputs[k])] / self.noise[k]
+    fn whitened(&self, curve: impl Fn(usize, usize) -> f64) -> Matrix {
+        Matrix::from_fn(self.curves.errors.rows(), self.outputs.len(), |i, k| {
+            curve(i, self.outputs[k]) / self.noise[k]
         })
     }
 
@@ -83,9 +77,9 @@ impl<'a> Shifts<'a> {
         })
     }
 
-    /// Tapered mean square of curves at the selected outputs.
-    pub fn covariance(&self, curves: &Matrix) -> Matrix {
-        self.damped(&self.whitened(curves))
+    /// Tapered mean square of the curves at the selected outputs, with their sizes.
+    pub fn covariance(&self) -> Matrix {
+        self.damped(&self.whitened(|i, j| self.curves.errors[(i, j)]))
     }
 
     fn damped(&self, white: &Matrix) -> Matrix {

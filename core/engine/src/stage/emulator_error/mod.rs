@@ -33,7 +33,7 @@ use crate::study::Study;
 use factor::Shifts;
 use pilot::Pilot;
 use size::Size;
-use taper::Places;
+use taper::{Places, Scaled};
 
 pub use curves::{Curves, Runs, rows_near_prior};
 
@@ -46,7 +46,7 @@ pub fn allowance(study: &Study, fitted: &Fitted, fit: Fit<'_>) -> Result<Allowan
 /// The error of a fitted emulator with its mean size over the prior, where there are no data.
 pub fn over_prior(study: &Study, fitted: &Fitted) -> Result<CommonError, Stop> {
     let curves = fitted.curves.near_prior(study);
-    let factor = Places::of(&study.layouts).factor(&curves.errors, &[])?;
+    let factor = Places::of(&study.layouts).factor(&Scaled::plain(&curves.errors), &[])?;
     Ok(CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true })
 }
 
@@ -57,24 +57,34 @@ pub fn factors(study: &Study, curves: &Curves, fit: Fit<'_>) -> Result<[Matrix; 
     let size = Size::learned(curves);
     let noise = noise::of_mean(study, data, forward, best, &curves.errors)?;
     let places = Places::of(&study.layouts);
-    let shapes = size.without(&curves.errors);
-    let shifts = Shifts::of(curves, &shapes, &size, &places, &noise);
+    let shifts = Shifts::of(curves, &size, &places, &noise);
     let slopes = |point: &[f64]| best_fit::standard_slopes(study, forward, point);
     let factor = shifts.factor(&slopes);
     let there = if size.varies() {
-        let even = shifts.covariance(&curves.errors);
+        let even = shifts.covariance();
         let slopes = slopes(best);
         Pilot { study, forward, best, slopes: &slopes }.size(&shifts, &even, &size)
     } else {
         1.0
     };
-    let enlarged = places.factor(&scaled(&shapes, there * factor), &noise)?;
+    let shapes =
+        Scaled { errors: &curves.errors, divisors: Some(&size.at_curves), factor: there * factor };
+    let enlarged = places.factor(&shapes, &noise)?;
     let own = scaled(&enlarged, 1.0 / factor);
     Ok([enlarged, own])
 }
 
 fn scaled(matrix: &Matrix, factor: f64) -> Matrix {
     Matrix::from_fn(matrix.rows(), matrix.columns(), |i, j| factor * matrix[(i, j)])
+}
+
+/// Sum of the squares of each column.
+fn column_squares(matrix: &Matrix) -> Vec<f64> {
+    let mut squares = vec![0.0; matrix.columns()];
+    for row in matrix.iter_rows() {
+        squares.iter_mut().zip(row).for_each(|(sum, e)| *sum += e * e);
+    }
+    squares
 }
 
 /// At most `most` of `count` indices, evenly spaced.

@@ -5,6 +5,7 @@ use lacuna::plugin::Forward;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
+use super::column_squares;
 use crate::study::Study;
 
 /// Smallest fraction of the residual variance of the best fit that counts as noise.
@@ -34,7 +35,7 @@ pub fn of_mean_at(
     let summaries = data.summaries();
     let section =
         study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
-    let square = |j: usize| errors.column(j).iter().map(|e| e * e).sum::<f64>();
+    let squares = column_squares(errors);
     let mut all = Vec::with_capacity(summaries.len());
     for (layout, range) in study.layouts.parts() {
         let (own, part) = (&summaries[range.clone()], &response[range.clone()]);
@@ -49,7 +50,7 @@ pub fn of_mean_at(
             let left = measured().map(|j| (own[j].mean - part[j]).powi(2)).sum::<f64>() / count;
             let runs = errors.rows().max(1) as f64;
             let of_emulator =
-                measured().map(|j| square(range.start + j) / runs).sum::<f64>() / count;
+                measured().map(|j| squares[range.start + j] / runs).sum::<f64>() / count;
             // The residuals contain the emulator's error, which is in the covariance already; the limit keeps a poor
             // emulator from explaining all of them.
             (left - of_emulator).max(LEAST * left)

@@ -69,7 +69,7 @@ impl Size {
         let mut best = (criterion(&logs, 0.0, &vec![0.0; runs]), constant);
         let mut candidates = Vec::new();
         if let Some(stated) = &curves.stated {
-            let scale = output_scales(stated);
+            let scale = output_scales(stated, |_, variance| variance);
             let variances = stated.iter_rows().map(|row| relative(row, &scale)).collect();
             candidates.push((Law::Stated(scale), variances));
         }
@@ -105,11 +105,6 @@ impl Size {
         !matches!(self.law, Law::Constant)
     }
 
-    /// Divides the curves by their sizes.
-    pub fn without(&self, errors: &Matrix) -> Matrix {
-        Matrix::from_fn(errors.rows(), errors.columns(), |i, j| errors[(i, j)] / self.at_curves[i])
-    }
-
     /// Sizes at points in physical units, one per row of `points`.
     pub fn values(&self, forward: &dyn Forward, points: &Matrix) -> Option<Vec<f64>> {
         let variances: Vec<f64> = match &self.law {
@@ -141,10 +136,7 @@ fn sizes(errors: &Matrix) -> Vec<f64> {
     let mut sizes = vec![1.0; errors.rows()];
     // Sizes and scales of the outputs depend on each other; a few fixed-point iterations separate them.
     for _ in 0..5 {
-        let white =
-            Matrix::from_fn(errors.rows(), errors.columns(), |i, j| errors[(i, j)] / sizes[i]);
-        let squares = Matrix::from_fn(white.rows(), white.columns(), |i, j| white[(i, j)].powi(2));
-        let scale = output_scales(&squares);
+        let scale = output_scales(errors, |i, e| (e / sizes[i]).powi(2));
         let square = |row: &[f64]| -> f64 {
             let each = row.iter().zip(&scale).map(|(e, v)| e * e / v);
             each.sum::<f64>() / row.len() as f64
@@ -160,10 +152,14 @@ fn sizes(errors: &Matrix) -> Vec<f64> {
     sizes.iter().map(|q| q / level).collect()
 }
 
-/// Mean of each column, plus a thousandth of the overall mean, so that an output with almost no errors gets almost
-/// no weight.
-fn output_scales(values: &Matrix) -> Vec<f64> {
-    let each: Vec<f64> = (0..values.columns()).map(|j| mean(&values.column(j))).collect();
+/// Mean of `of` each entry of a column and its row, plus a thousandth of the overall mean, so that an output with almost
+/// no errors gets almost no weight.
+fn output_scales(values: &Matrix, of: impl Fn(usize, f64) -> f64) -> Vec<f64> {
+    let mut sums = vec![0.0; values.columns()];
+    for (i, row) in values.iter_rows().enumerate() {
+        sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += of(i, *value));
+    }
+    let each: Vec<f64> = sums.iter().map(|sum| sum / values.rows() as f64).collect();
     let floor = (1e-3 * mean(&each)).max(f64::MIN_POSITIVE);
     each.iter().map(|v| v + floor).collect()
 }

@@ -3,8 +3,9 @@
 use lacuna::data::{Coordinates, Layouts};
 use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, multiply, symmetric_eigen, transposed_multiply};
+use rayon::prelude::*;
 
-use super::thinned;
+use super::{column_squares, thinned};
 
 /// Length over which correlations are damped, as a fraction of an axis.
 const LENGTH: f64 = 0.15;
@@ -14,6 +15,9 @@ const APART: f64 = 0.7;
 
 /// Number of outputs whose covariance is decomposed; the result is extended to the others.
 const OUTPUTS: usize = 1000;
+
+/// Number of outputs to which it is extended at a time.
+const BLOCK: usize = 8192;
 
 /// Directions with a variance below this fraction of the smallest noise are omitted, and no others: along omitted
 /// directions the emulator counts as exact, and estimates trust them. A hundred of a thousand directions may contain
@@ -56,17 +60,28 @@ impl Places {
         product
     }
 
-    /// Covariance of some curves, one per row, as a factor of low rank, `outputs x rank`; `noise` is the variance of
-    /// what was measured by output, NaN where nothing was.
+    /// Covariance of some curves, one per row and multiplied by its own scale, as a factor of low rank,
+    /// `outputs x rank`; `noise` is the variance of what was measured by output, NaN where nothing was.
     ///
     /// For many outputs the covariance of a subset is decomposed and extended to all (Nyström); each output keeps its
     /// variance.
-    pub fn factor(&self, curves: &Matrix, noise: &[f64]) -> Result<Matrix, Stop> {
-        let outputs = curves.columns();
+    pub fn factor(&self, curves: &Scaled<'_>, noise: &[f64]) -> Result<Matrix, Stop> {
+        let outputs = curves.errors.columns();
         let few = thinned(outputs, OUTPUTS);
-        let known = curves.select_columns(&few);
-        let count = curves.rows().max(1) as f64;
-        let among = transposed_multiply(&known, &known);
+        let known = curves.at(&few);
+        let directions = self.directions(&known, &few, noise)?;
+        let all: Vec<usize> = (0..outputs).collect();
+        let blocks: Vec<Matrix> = all
+            .par_chunks(BLOCK)
+            .map(|some| self.extended(&curves.at(some), some, (&known, &few), &directions))
+            .collect();
+        Ok(Matrix::from_rows(directions.columns(), blocks.iter().flat_map(Matrix::iter_rows)))
+    }
+
+    /// Directions of the covariance of the curves at few outputs, each divided by its standard deviation.
+    fn directions(&self, known: &Matrix, few: &[usize], noise: &[f64]) -> Result<Matrix, Stop> {
+        let count = known.rows().max(1) as f64;
+        let among = transposed_multiply(known, known);
         let among = Matrix::from_fn(few.len(), few.len(), |i, j| {
             among[(i, j)] / count * self.damping(few[i], few[j])
         });
@@ -77,21 +92,57 @@ impl Places {
         let floor = if least.is_finite() { SEEN * least } else { 0.0 };
         let floor = floor.min(0.1 * largest).max(1e-9 * largest);
         let kept: Vec<usize> = (0..few.len()).rev().filter(|&k| eigen.values[k] > floor).collect();
-        let directions = Matrix::from_fn(few.len(), kept.len(), |i, k| {
+        Ok(Matrix::from_fn(few.len(), kept.len(), |i, k| {
             eigen.vectors[(i, kept[k])] / eigen.values[kept[k]].sqrt()
+        }))
+    }
+
+    /// Rows of the factor for some outputs.
+    fn extended(
+        &self,
+        curves: &Matrix,
+        outputs: &[usize],
+        (known, few): (&Matrix, &[usize]),
+        directions: &Matrix,
+    ) -> Matrix {
+        let count = curves.rows().max(1) as f64;
+        let across = transposed_multiply(curves, known);
+        let across = Matrix::from_fn(outputs.len(), few.len(), |i, j| {
+            across[(i, j)] / count * self.damping(outputs[i], few[j])
         });
-        let across = transposed_multiply(curves, &known);
-        let across = Matrix::from_fn(outputs, few.len(), |i, j| {
-            across[(i, j)] / count * self.damping(i, few[j])
-        });
-        let mut factor = multiply(&across, &directions);
-        for j in 0..outputs {
+        let mut factor = multiply(&across, directions);
+        for (j, square) in column_squares(curves).into_iter().enumerate() {
             // Omitted directions and the extension to all outputs lose variance, which is restored output by output.
-            let variance = curves.column(j).iter().map(|e| e * e).sum::<f64>() / count;
+            let variance = square / count;
             let kept = factor.row(j).iter().map(|f| f * f).sum::<f64>();
             let grow = if kept > 0.0 { (variance / kept).sqrt().clamp(1.0, 2.0) } else { 1.0 };
             factor.row_mut(j).iter_mut().for_each(|f| *f *= grow);
         }
-        Ok(factor)
+        factor
+    }
+}
+
+/// Curves of which each has a scale of its own.
+pub struct Scaled<'a> {
+    /// Curves, one per row.
+    pub errors: &'a Matrix,
+    /// Divisor of each curve; `None` for one.
+    pub divisors: Option<&'a [f64]>,
+    /// Factor on all curves, after the division.
+    pub factor: f64,
+}
+
+impl<'a> Scaled<'a> {
+    /// Curves as they are.
+    pub fn plain(errors: &'a Matrix) -> Self {
+        Self { errors, divisors: None, factor: 1.0 }
+    }
+
+    /// The scaled curves at some outputs.
+    fn at(&self, outputs: &[usize]) -> Matrix {
+        let divisor = |i: usize| self.divisors.map_or(1.0, |all| all[i]);
+        Matrix::from_fn(self.errors.rows(), outputs.len(), |i, k| {
+            self.factor * (self.errors[(i, outputs[k])] / divisor(i))
+        })
     }
 }

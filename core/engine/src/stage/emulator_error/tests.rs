@@ -10,7 +10,7 @@ use super::curves::{Curves, Runs};
 use super::factor::Shifts;
 use super::kriging::Kriging;
 use super::size::Size;
-use super::taper::Places;
+use super::taper::{Places, Scaled};
 
 fn points(count: usize, seed: u64) -> Matrix {
     let mut rng = Stream::root(seed).generator();
@@ -98,7 +98,7 @@ fn correlations_are_damped_and_variances_kept() {
     let layouts = layouts(8);
     let places = Places::of(&layouts);
     let known = curves(5, 16, |_| 1.0).errors;
-    let factor = places.factor(&known, &[1e-6; 16]).unwrap();
+    let factor = places.factor(&Scaled::plain(&known), &[1e-6; 16]).unwrap();
     let found = multiply_transposed(&factor, &factor);
     for (i, j, damping) in [
         (3, 3, 1.0),
@@ -119,7 +119,7 @@ fn no_direction_above_the_noise_is_left_out() {
     let (outputs, noise) = (600, 1e-2);
     let known = curves(40, outputs, |_| 1.0);
     let places = Places::of(&layouts(outputs / 2));
-    let factor = places.factor(&known.errors, &vec![noise; outputs]).unwrap();
+    let factor = places.factor(&Scaled::plain(&known.errors), &vec![noise; outputs]).unwrap();
     let found = multiply_transposed(&factor, &factor);
     for i in (0..outputs).step_by(7) {
         for j in (0..outputs).step_by(11) {
@@ -135,9 +135,8 @@ fn no_direction_above_the_noise_is_left_out() {
 fn factor_of(known: &Curves, noise: f64, slopes: &Matrix) -> f64 {
     let layouts = layouts(known.errors.columns() / 2);
     let (places, size) = (Places::of(&layouts), Size::learned(known));
-    let shapes = size.without(&known.errors);
     let noise = vec![noise; known.errors.columns()];
-    Shifts::of(known, &shapes, &size, &places, &noise).factor(&|_| slopes.clone())
+    Shifts::of(known, &size, &places, &noise).factor(&|_| slopes.clone())
 }
 
 /// Independent errors have the tapered covariance as stated: no factor is needed except the one for few curves, here
