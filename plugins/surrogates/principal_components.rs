@@ -1,7 +1,10 @@
 //! Principal components of the outputs: a thousand correlated outputs are reduced to a few tens of scores.
 
+use std::ops::Range;
+
 use lacuna::run::Stop;
-use lacuna_linalg::Matrix;
+use lacuna_linalg::{Matrix, wide};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -27,8 +30,10 @@ pub struct PrincipalComponents {
     pub directions: Matrix,
     /// `T` (`runs x components`).
     pub scores: Matrix,
-    /// `E`, the part that the components leave out (`runs x outputs`).
-    pub remainder: Matrix,
+    /// `E`, the part that the components leave out (`runs x outputs`); `None` if only its size is known.
+    pub remainder: Option<Matrix>,
+    /// Mean square of `E` over the runs, by output.
+    pub truncation: Vec<f64>,
 }
 
 /// Number of values (runs times outputs) above which components are computed from the products of the runs.
@@ -38,6 +43,8 @@ const LARGE: usize = 10_000_000;
 const RESOLVED: f64 = 1e-7;
 /// Number of runs whose kept part is in memory at a time.
 const BLOCK: usize = 64;
+/// Number of blocks of outputs computed together.
+const BLOCKS: usize = 16;
 
 impl Components {
     /// Returns a description of what is wrong with the choice, if anything.
@@ -54,21 +61,35 @@ impl Components {
     /// Computes the components of responses (`runs x outputs`).
     pub fn of(&self, responses: &Matrix) -> Result<PrincipalComponents, Stop> {
         let (runs, outputs) = (responses.rows(), responses.columns());
-        let mean: Vec<f64> =
-            (0..outputs).map(|j| responses.column(j).iter().sum::<f64>() / runs as f64).collect();
-        let centred = Matrix::from_fn(runs, outputs, |i, j| responses[(i, j)] - mean[j]);
-        if *self == Self::None {
+        let large = outputs > runs && runs * outputs > LARGE && !self.needs_all_digits();
+        self.computed(responses, large)
+    }
+
+    /// Computes all components of responses (`runs x outputs`) that carry more than rounding errors; of more outputs than
+    /// runs those whose variance is above `1e-14` of the largest. Of many values the remainder is not kept.
+    pub fn resolved(responses: &Matrix) -> Result<PrincipalComponents, Stop> {
+        let (runs, outputs) = (responses.rows(), responses.columns());
+        if outputs > runs && runs * outputs > LARGE {
+            return by_blocks(responses);
+        }
+        Self::Variance(1.0).computed(responses, outputs > runs)
+    }
+
+    fn computed(self, responses: &Matrix, by_runs: bool) -> Result<PrincipalComponents, Stop> {
+        let (runs, outputs) = (responses.rows(), responses.columns());
+        let mean = wide::column_means(responses);
+        let centred = wide::centred(responses, &mean, &(0..outputs));
+        if self == Self::None {
             return Ok(PrincipalComponents::of_outputs(mean, &centred));
         }
-        let failed = |e| Stop::new(format!("the principal components of the outputs: {e}"));
-        if outputs > runs && runs * outputs > LARGE && !self.needs_all_digits() {
+        if by_runs {
             return self.by_runs(mean, centred).map_err(failed);
         }
         let svd = lacuna_linalg::thin_svd(&centred).map_err(failed)?;
         let rank = self.rank(&svd.values);
         let scores = Matrix::from_fn(runs, rank, |i, k| svd.u[(i, k)] * svd.values[k]);
         let directions = Matrix::from_fn(outputs, rank, |j, k| svd.v[(j, k)]);
-        Ok(PrincipalComponents { mean, directions, scores, remainder: centred }.with_remainder())
+        Ok(PrincipalComponents::without(centred, mean, directions, scores))
     }
 
     /// Returns true if components are wanted that the eigenvalues of products do not resolve.
@@ -84,19 +105,10 @@ impl Components {
         mean: Vec<f64>,
         centred: Matrix,
     ) -> Result<PrincipalComponents, lacuna_linalg::Error> {
-        let runs = centred.rows();
         let products = lacuna_linalg::multiply_transposed(&centred, &centred);
-        let eigen = lacuna_linalg::symmetric_eigen(&products)?;
-        let mut values: Vec<f64> = eigen.values.iter().rev().map(|v| v.max(0.0).sqrt()).collect();
-        let largest = values.first().copied().unwrap_or(0.0);
-        values.retain(|s| *s > RESOLVED * largest);
-        let rank = self.rank(&values);
-        // The eigenvalues are in increasing order.
-        let scores =
-            Matrix::from_fn(runs, rank, |i, k| eigen.vectors[(i, runs - 1 - k)] * values[k]);
-        let scaled = Matrix::from_fn(runs, rank, |i, k| scores[(i, k)] / (values[k] * values[k]));
+        let [scores, scaled] = scores(&products, |values| self.rank(values))?;
         let directions = lacuna_linalg::transposed_multiply(&centred, &scaled);
-        Ok(PrincipalComponents { mean, directions, scores, remainder: centred }.with_remainder())
+        Ok(PrincipalComponents::without(centred, mean, directions, scores))
     }
 
     fn rank(&self, singular_values: &[f64]) -> usize {
@@ -120,7 +132,89 @@ impl Components {
     }
 }
 
+/// Returns the message for components that cannot be computed.
+fn failed(error: lacuna_linalg::Error) -> Stop {
+    Stop::new(format!("the principal components of the outputs: {error}"))
+}
+
+/// Returns the scores `U S` (`runs x components`) from the products of the runs `U S^2 U'`, and `U S^-1`; `rank` chooses
+/// from the singular values that the products resolve.
+fn scores(
+    products: &Matrix,
+    rank: impl Fn(&[f64]) -> usize,
+) -> Result<[Matrix; 2], lacuna_linalg::Error> {
+    let runs = products.rows();
+    let eigen = lacuna_linalg::symmetric_eigen(products)?;
+    let mut values: Vec<f64> = eigen.values.iter().rev().map(|v| v.max(0.0).sqrt()).collect();
+    let largest = values.first().copied().unwrap_or(0.0);
+    values.retain(|s| *s > RESOLVED * largest);
+    let rank = rank(&values);
+    // The eigenvalues are in increasing order.
+    let scores = Matrix::from_fn(runs, rank, |i, k| eigen.vectors[(i, runs - 1 - k)] * values[k]);
+    let scaled = Matrix::from_fn(runs, rank, |i, k| scores[(i, k)] / (values[k] * values[k]));
+    Ok([scores, scaled])
+}
+
+/// Computes all components that the products of the runs resolve, without a matrix of the size of the responses.
+fn by_blocks(responses: &Matrix) -> Result<PrincipalComponents, Stop> {
+    let (runs, mean) = (responses.rows(), wide::column_means(responses));
+    let blocks = wide::blocks(mean.len());
+    let product = |some: &[Range<usize>]| wide::products(responses, &mean, some);
+    let parts: Vec<Matrix> = blocks.par_chunks(BLOCKS).map(product).collect();
+    let mut products = Matrix::zeros(runs, runs);
+    for part in &parts {
+        products.as_mut_slice().iter_mut().zip(part.as_slice()).for_each(|(sum, x)| *sum += x);
+    }
+    let [scores, scaled] = scores(&products, <[f64]>::len).map_err(failed)?;
+    let of_block = |own: &Range<usize>| {
+        let centred = wide::centred(responses, &mean, own);
+        let directions = lacuna_linalg::transposed_multiply(&centred, &scaled);
+        let own = PrincipalComponents::without(centred, Vec::new(), directions, scores.clone());
+        (own.directions, own.truncation)
+    };
+    let mut directions = Matrix::zeros(0, scores.columns());
+    directions.reserve_rows(mean.len());
+    let mut truncation = Vec::with_capacity(mean.len());
+    for some in blocks.chunks(BLOCKS) {
+        let found: Vec<_> = some.par_iter().map(of_block).collect();
+        for (own, left) in found {
+            own.iter_rows().for_each(|row| directions.push_row(row));
+            truncation.extend(left);
+        }
+    }
+    Ok(PrincipalComponents { mean, directions, scores, remainder: None, truncation })
+}
+
 impl PrincipalComponents {
+    /// Takes components out of centred responses.
+    fn without(centred: Matrix, mean: Vec<f64>, directions: Matrix, scores: Matrix) -> Self {
+        let mut remainder = centred;
+        let runs = scores.rows();
+        for first in (0..runs).step_by(BLOCK) {
+            let rows: Vec<usize> = (first..runs.min(first + BLOCK)).collect();
+            let kept = lacuna_linalg::multiply_transposed(&scores.select_rows(&rows), &directions);
+            for (&i, kept) in rows.iter().zip(kept.iter_rows()) {
+                remainder.row_mut(i).iter_mut().zip(kept).for_each(|(e, k)| *e -= k);
+            }
+        }
+        Self::with_remainder(mean, directions, scores, remainder)
+    }
+
+    fn with_remainder(
+        mean: Vec<f64>,
+        directions: Matrix,
+        scores: Matrix,
+        remainder: Matrix,
+    ) -> Self {
+        let mut squares = vec![0.0; remainder.columns()];
+        for row in remainder.iter_rows() {
+            squares.iter_mut().zip(row).for_each(|(sum, e)| *sum += e * e);
+        }
+        let runs = remainder.rows() as f64;
+        let truncation = squares.into_iter().map(|sum| sum / runs).collect();
+        Self { mean, directions, scores, remainder: Some(remainder), truncation }
+    }
+
     /// Takes each output that varies by more than round-off as its own component, in the order of the outputs.
     fn of_outputs(mean: Vec<f64>, centred: &Matrix) -> Self {
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
@@ -136,53 +230,41 @@ impl PrincipalComponents {
                 remainder[(i, j)] = 0.0;
             }
         }
-        Self { mean, directions, scores, remainder }
+        Self::with_remainder(mean, directions, scores, remainder)
     }
 
     /// Returns the first components alone; the others become part of the remainder.
     pub fn first(self, count: usize) -> Self {
         let kept: Vec<usize> = (0..count).collect();
         let left: Vec<usize> = (count..self.scores.columns()).collect();
-        let Self { mean, directions, scores, mut remainder } = self;
+        let Self { mean, directions, scores, remainder, mut truncation } = self;
+        let Some(mut remainder) = remainder else {
+            // Scores of different components are orthogonal over the runs.
+            let variance = |k: &usize| scores.column(*k).iter().map(|s| s * s).sum::<f64>();
+            let variances: Vec<f64> = left.iter().map(variance).collect();
+            for (sum, row) in truncation.iter_mut().zip(directions.iter_rows()) {
+                let squares = row[count..].iter().zip(&variances).map(|(v, s)| v * v * s);
+                *sum += squares.sum::<f64>() / scores.rows() as f64;
+            }
+            let directions = directions.select_columns(&kept);
+            let scores = scores.select_columns(&kept);
+            return Self { mean, directions, scores, remainder: None, truncation };
+        };
         let others = lacuna_linalg::multiply_transposed(
             &scores.select_columns(&left),
             &directions.select_columns(&left),
         );
         remainder.as_mut_slice().iter_mut().zip(others.as_slice()).for_each(|(e, o)| *e += o);
         let (directions, scores) = (directions.select_columns(&kept), scores.select_columns(&kept));
-        Self { mean, directions, scores, remainder }
+        Self::with_remainder(mean, directions, scores, remainder)
     }
 
     /// Returns the same mean and directions with the scores and the remainder of other runs.
     pub fn of_all(self, responses: &Matrix) -> Self {
         let Self { mean, directions, .. } = self;
-        let mut centred = responses.clone();
-        for i in 0..centred.rows() {
-            centred.row_mut(i).iter_mut().zip(&mean).for_each(|(y, m)| *y -= m);
-        }
+        let centred = wide::centred(responses, &mean, &(0..mean.len()));
         let scores = lacuna_linalg::multiply(&centred, &directions);
-        Self { mean, directions, scores, remainder: centred }.with_remainder()
-    }
-
-    /// Takes the components out of the centred responses, which are in place of the remainder.
-    fn with_remainder(mut self) -> Self {
-        let runs = self.scores.rows();
-        for first in (0..runs).step_by(BLOCK) {
-            let rows: Vec<usize> = (first..runs.min(first + BLOCK)).collect();
-            let scores = self.scores.select_rows(&rows);
-            let kept = lacuna_linalg::multiply_transposed(&scores, &self.directions);
-            for (&i, kept) in rows.iter().zip(kept.iter_rows()) {
-                self.remainder.row_mut(i).iter_mut().zip(kept).for_each(|(e, k)| *e -= k);
-            }
-        }
-        self
-    }
-
-    /// Returns for each output the mean square over the runs of the part that the components leave out.
-    pub fn truncation(&self) -> Vec<f64> {
-        let runs = self.remainder.rows() as f64;
-        let square = |j: usize| self.remainder.column(j).iter().map(|e| e * e).sum::<f64>() / runs;
-        (0..self.remainder.columns()).map(square).collect()
+        Self::without(centred, mean, directions, scores)
     }
 }
 
@@ -199,9 +281,9 @@ mod tests {
         let responses = lacuna_linalg::multiply(&random(40, 3), &random(3, 25));
         let found = Components::Variance(1.0).of(&responses).unwrap();
         assert_eq!(found.scores.columns(), 3);
-        assert!(found.truncation().iter().all(|t| *t < 1e-24));
+        assert!(found.truncation.iter().all(|t| *t < 1e-24));
         let two = Components::Count(2).of(&responses).unwrap();
-        let left: f64 = two.truncation().iter().sum();
+        let left: f64 = two.truncation.iter().sum();
         let third: f64 = found.scores.column(2).iter().map(|s| s * s).sum::<f64>() / 40.0;
         assert!((left - third).abs() < 1e-12 * third);
     }
@@ -232,8 +314,36 @@ mod tests {
             let length: f64 = found.directions.column(k).iter().map(|x| x * x).sum();
             assert!((length - 1.0).abs() < 1e-10);
         }
-        for (a, b) in found.truncation().iter().zip(expected.truncation()) {
+        for (a, b) in found.truncation.iter().zip(expected.truncation) {
             assert!((a - b).abs() < 1e-9 * (1.0 + b), "{a} {b}");
+        }
+    }
+
+    /// Block by block the components are the same; the variance of those that are dropped adds to what is left out.
+    #[test]
+    fn components_by_blocks_are_those_of_the_decomposition() {
+        let mut rng = Stream::root(4).generator();
+        let mut random = |rows, columns| Matrix::from_fn(rows, columns, |_, _| normal(&mut rng));
+        let (scores, directions) = (random(15, 3), random(20_000, 3));
+        let mut responses = lacuna_linalg::multiply_transposed(&scores, &directions);
+        let noise = random(15, 20_000);
+        let both = responses.as_mut_slice().iter_mut().zip(noise.as_slice());
+        both.for_each(|(y, e)| *y += 3.0 + 0.01 * e);
+        let found = by_blocks(&responses).unwrap();
+        let expected = Components::Variance(1.0).of(&responses).unwrap();
+        assert_eq!((found.scores.columns(), found.remainder.as_ref()), (14, None));
+        assert!(found.truncation.iter().all(|left| *left < 1e-15));
+        let (found, expected) = (found.first(3), expected.first(3));
+        for k in 0..3 {
+            let sign = (found.directions[(0, k)] / expected.directions[(0, k)]).signum();
+            for j in [0, 8191, 8192, 19_999] {
+                let (a, b) = (found.directions[(j, k)], expected.directions[(j, k)]);
+                assert!((sign * a - b).abs() < 1e-9, "{a} {b}");
+            }
+        }
+        for j in [0, 8191, 8192, 19_999] {
+            let (a, b) = (found.truncation[j], expected.truncation[j]);
+            assert!((a - b).abs() < 1e-9 * b, "{a} {b}");
         }
     }
 
@@ -246,14 +356,16 @@ mod tests {
         let first = Components::Variance(1.0).of(&part).unwrap().first(3);
         assert_eq!(first.scores.columns(), 3);
         let direct = Components::Count(3).of(&part).unwrap();
-        for (a, b) in first.remainder.as_slice().iter().zip(direct.remainder.as_slice()) {
+        let remainder = |of: &PrincipalComponents| of.remainder.clone().unwrap();
+        for (a, b) in remainder(&first).as_slice().iter().zip(remainder(&direct).as_slice()) {
             assert!((a - b).abs() < 1e-12, "{a} {b}");
         }
         for (found, of) in [(first.clone(), &part), (first.of_all(&responses), &responses)] {
             let back = lacuna_linalg::multiply_transposed(&found.scores, &found.directions);
+            let remainder = remainder(&found);
             for i in 0..of.rows() {
                 for j in 0..8 {
-                    let whole = found.mean[j] + back[(i, j)] + found.remainder[(i, j)];
+                    let whole = found.mean[j] + back[(i, j)] + remainder[(i, j)];
                     assert!((whole - of[(i, j)]).abs() < 1e-12);
                 }
             }
@@ -267,9 +379,10 @@ mod tests {
         let found = Components::None.of(&responses).unwrap();
         assert_eq!((found.scores.columns(), found.mean[1]), (2, 5.0));
         let back = lacuna_linalg::multiply_transposed(&found.scores, &found.directions);
+        let remainder = found.remainder.clone().unwrap();
         for i in 0..6 {
             for j in 0..3 {
-                let whole = found.mean[j] + back[(i, j)] + found.remainder[(i, j)];
+                let whole = found.mean[j] + back[(i, j)] + remainder[(i, j)];
                 assert!((whole - responses[(i, j)]).abs() < 1e-14);
             }
         }

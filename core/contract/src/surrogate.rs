@@ -1,5 +1,7 @@
 //! Contract of surrogates.
 
+mod axes;
+
 use lacuna::data::{Layouts, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
@@ -22,6 +24,7 @@ use crate::judge::{Check, agree, calm, judge, layout, refused, same_on_threads, 
 /// - Sobol' indices are fractions: first-order no larger than total, between 0 and 1.
 /// - A surrogate that takes derivatives is better with those of 15 runs, one of which has none, than without.
 /// - A weighted sum of emulators, if implemented, has the sum of their responses and slopes.
+/// - A surrogate for rotated outputs, if implemented, fits the rotated emulator of many outputs.
 /// - The covariances of its errors between points, if known, are symmetric, and no variance that follows from them
 ///   exceeds the one that the emulator states.
 /// - It is restored from its bytes bit for bit, and damaged bytes are rejected.
@@ -29,13 +32,14 @@ use crate::judge::{Check, agree, calm, judge, layout, refused, same_on_threads, 
 /// - Runs that are too few, of unequal number or not finite are rejected.
 pub fn surrogate(name: &str, surrogate: &dyn Surrogate) -> Result<(), Vec<String>> {
     let problem = Problem::new();
-    let checks: [Check<'_>; 9] = [
+    let checks: [Check<'_>; 10] = [
         ("emulates", Box::new(|| emulates(surrogate, &problem))),
         ("knows its derivatives", Box::new(|| knows_its_derivatives(surrogate, &problem))),
         ("learns from derivatives", Box::new(|| learns_from_derivatives(surrogate, &problem))),
         ("shares out the variance", Box::new(|| shares_out_the_variance(surrogate, &problem))),
         ("knows its errors", Box::new(|| knows_its_errors(surrogate, &problem))),
         ("adds up", Box::new(|| adds_up(surrogate, &problem))),
+        ("does not depend on axes", Box::new(|| axes::turns(surrogate, &problem))),
         ("reads back", Box::new(|| reads_back(surrogate, &problem))),
         ("repeats itself", Box::new(|| same_on_threads(|| problem.bytes(surrogate)))),
         ("refuses bad runs", Box::new(|| refuses_bad_runs(surrogate, &problem))),

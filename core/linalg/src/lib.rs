@@ -20,6 +20,7 @@ mod qr;
 pub mod radial;
 mod svd;
 mod triangular;
+pub mod wide;
 
 pub use cholesky::Cholesky;
 pub use eigen::{SymmetricEigen, symmetric_eigen};

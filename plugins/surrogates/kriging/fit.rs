@@ -121,7 +121,7 @@ impl Settings {
             points: training.points.clone(),
             scores,
             loadings,
-            truncation: parts.truncation(),
+            truncation: parts.truncation.clone(),
             fit_error,
         })
     }
@@ -259,8 +259,9 @@ fn fit_error(
         }
     }
     let mut residuals = multiply(&errors, loadings);
-    for (e, r) in residuals.as_mut_slice().iter_mut().zip(parts.remainder.as_slice()) {
-        *e += r;
+    if let Some(remainder) = &parts.remainder {
+        let all = residuals.as_mut_slice().iter_mut().zip(remainder.as_slice());
+        all.for_each(|(e, r)| *e += r);
     }
     let largest = responses.as_slice().iter().fold(0.0_f64, |most, y| most.max(y.abs()));
     let mean_square = |column: Vec<f64>, mean: f64| {

@@ -1,5 +1,7 @@
 //! The fitted expansion.
 
+use std::borrow::Cow;
+
 use lacuna::plugin::forward::{Linear, SumOfSquares};
 use lacuna::plugin::surrogate::{FitError, Sensitivity, Tables};
 use lacuna::plugin::{Emulator, Fact, Forward};
@@ -8,21 +10,23 @@ use lacuna_linalg::{Matrix, multiply, transposed_multiply};
 use serde::{Deserialize, Serialize};
 
 use super::coordinate::Coordinate;
+use super::errors::{Errors, OfComponents};
+use super::functions::Functions;
 use super::options::{Selection, Solver};
 use super::sparse::Sparse;
 use super::squares::Squares;
 use super::terms::{Basis, Terms};
 use super::{bytes, sensitivity, tables};
 
-/// A polynomial chaos expansion of all outputs over the union of their terms.
+/// A polynomial chaos expansion of all outputs over the union of their terms, or over few components.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expansion {
-    basis: Basis,
-    /// Coefficients (`terms x outputs`).
+    functions: Functions,
+    /// Coefficients (`functions x outputs`).
     coefficients: Matrix,
     /// Sparse form of the coefficients, if most of them are zero.
     sparse: Option<Sparse>,
-    fit_error: FitError,
+    errors: Errors,
     summary: Summary,
 }
 
@@ -80,25 +84,68 @@ pub struct Reduction {
 struct Header {
     coordinates: Vec<Coordinate>,
     exponents: Vec<u16>,
+    /// Number of functions that combine the basis functions, if there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    combined: Option<usize>,
     outputs: usize,
     runs: usize,
+    /// True if the errors are those of the components.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    errors_of_components: bool,
     summary: Summary,
 }
 
+impl Header {
+    /// Returns the sizes of the arrays: combinations, coefficients, relative errors, residuals and the factors on those of
+    /// components; `None` if they make no sense.
+    fn sizes(&self) -> Option<[(usize, usize); 5]> {
+        let (dimension, outputs) = (self.coordinates.len(), self.outputs);
+        if dimension == 0 || self.exponents.len() % dimension != 0 {
+            return None;
+        }
+        let terms = self.exponents.len() / dimension;
+        let functions = self.combined.unwrap_or(terms);
+        let combined = self.combined.map_or((0, 0), |functions| (terms, functions));
+        let (residuals, factors) = if self.errors_of_components {
+            (self.combined?.checked_sub(1)?, outputs)
+        } else {
+            (outputs, 0)
+        };
+        Some([combined, (functions, outputs), (1, outputs), (self.runs, residuals), (1, factors)])
+    }
+
+    /// Returns the number of values of arrays of these sizes.
+    fn count(sizes: [(usize, usize); 5]) -> Option<usize> {
+        sizes
+            .iter()
+            .try_fold(0, |sum: usize, &(rows, columns)| sum.checked_add(rows.checked_mul(columns)?))
+    }
+}
+
+/// Number of outputs whose coefficients of all terms are in memory at a time.
+const BLOCK: usize = 4096;
+
 impl Expansion {
     pub(super) fn new(
-        basis: Basis,
+        functions: Functions,
         coefficients: Matrix,
-        fit_error: FitError,
+        errors: Errors,
         summary: Summary,
     ) -> Self {
-        let sparse = Sparse::of(&coefficients);
-        Self { basis, coefficients, sparse, fit_error, summary }
+        let of_outputs = functions.combined.is_none();
+        let sparse = of_outputs.then(|| Sparse::of(&coefficients)).flatten();
+        Self { functions, coefficients, sparse, errors, summary }
     }
 
     /// Replaces terms and coefficients; errors and summary are kept.
     pub(super) fn with(self, basis: Basis, coefficients: Matrix) -> Self {
-        Self::new(basis, coefficients, self.fit_error, self.summary)
+        let errors = Errors::OfOutputs(self.errors.whole(&self.coefficients).clone());
+        Self::new(Functions::of(basis), coefficients, errors, self.summary)
+    }
+
+    /// Returns the coefficients of all terms (`terms x outputs`).
+    pub fn of_terms(&self) -> Cow<'_, Matrix> {
+        self.functions.of_terms(&self.coefficients)
     }
 
     /// Returns mean and variance of each output under the design's distribution.
@@ -114,47 +161,59 @@ impl Expansion {
 
     /// Returns the terms over which all outputs are expanded.
     pub fn terms(&self) -> &Terms {
-        self.basis.terms()
+        self.functions.basis.terms()
     }
 
     /// Returns the standard variables and polynomials of the parameters.
     pub fn basis_coordinates(&self) -> Vec<Coordinate> {
-        self.basis.coordinates().to_vec()
+        self.functions.basis.coordinates().to_vec()
     }
 
     fn moments(&self) -> Sensitivity {
-        sensitivity::sensitivity(self.basis.terms(), &self.coefficients, self.dimension())
+        let coefficients = |outputs: &[usize]| {
+            let own = self.coefficients.select_columns(outputs);
+            self.functions.of_terms(&own).into_owned()
+        };
+        if self.functions.combined.is_none() {
+            return sensitivity::sensitivity(self.terms(), &self.coefficients, self.dimension());
+        }
+        let outputs: Vec<usize> = (0..self.outputs()).collect();
+        let blocks = outputs.chunks(BLOCK).map(coefficients);
+        sensitivity::of_blocks(self.terms(), blocks, self.dimension())
     }
 
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, Stop> {
         let (header, mut numbers) = bytes::read::<Header>(bytes)?;
-        let dimension = header.coordinates.len();
-        let (outputs, runs) = (header.outputs, header.runs);
-        let whole = dimension > 0 && header.exponents.len() % dimension == 0;
-        let terms = header.exponents.len() / dimension.max(1);
-        if !whole || numbers.len() != (terms + 1 + runs) * outputs {
+        let sizes = header.sizes().ok_or_else(bytes::damaged)?;
+        if Header::count(sizes) != Some(numbers.len()) {
             return Err(bytes::damaged());
         }
-        let coefficients = Matrix::from_vec(terms, outputs, numbers.next(terms * outputs));
-        let relative = numbers.next(outputs);
-        let residuals = Matrix::from_vec(runs, outputs, numbers.next(runs * outputs));
+        let mut next = |(rows, columns): (usize, usize)| {
+            Matrix::from_vec(rows, columns, numbers.next(rows * columns))
+        };
+        let [combined, coefficients, relative, residuals, factors] = sizes.map(&mut next);
+        let dimension = header.coordinates.len();
         let mut degrees = header.exponents.iter().enumerate();
         if !degrees.all(|(k, &e)| header.coordinates[k % dimension].reaches(usize::from(e))) {
             return Err(bytes::damaged());
         }
         let terms_of = Terms::from_exponents(dimension, header.exponents);
-        Ok(Self::new(
-            Basis::new(header.coordinates, terms_of),
-            coefficients,
-            FitError { relative, residuals },
-            header.summary,
-        ))
+        let basis = Basis::new(header.coordinates, terms_of);
+        let combined = header.combined.map(|_| combined);
+        let relative = relative.into_vec();
+        let errors = if header.errors_of_components {
+            let factors = factors.into_vec();
+            Errors::OfComponents(OfComponents::new(relative, residuals, factors))
+        } else {
+            Errors::OfOutputs(FitError { relative, residuals })
+        };
+        Ok(Self::new(Functions { basis, combined }, coefficients, errors, header.summary))
     }
 }
 
 impl Forward for Expansion {
     fn dimension(&self) -> usize {
-        self.basis.coordinates().len()
+        self.functions.basis.coordinates().len()
     }
 
     fn outputs(&self) -> usize {
@@ -163,13 +222,13 @@ impl Forward for Expansion {
 
     fn mean(&self, points: &Matrix) -> Matrix {
         match &self.sparse {
-            Some(sparse) => sparse.mean(&self.basis, points),
-            None => multiply(&self.basis.values(points), &self.coefficients),
+            Some(sparse) => sparse.mean(&self.functions.basis, points),
+            None => multiply(&self.functions.values(points), &self.coefficients),
         }
     }
 
     fn jacobian(&self, point: &[f64]) -> Matrix {
-        let gradient = self.basis.gradient(point);
+        let gradient = self.functions.gradient(point);
         match &self.sparse {
             Some(sparse) => sparse.transposed_multiply(&gradient),
             None => transposed_multiply(&self.coefficients, &gradient),
@@ -187,33 +246,48 @@ impl Emulator for Expansion {
     }
 
     fn fit_error(&self) -> &FitError {
-        &self.fit_error
+        self.errors.whole(&self.coefficients)
+    }
+
+    fn relative_error(&self) -> &[f64] {
+        self.errors.relative()
+    }
+
+    fn left_out(&self, runs: &[usize], outputs: &[usize]) -> Matrix {
+        self.errors.at(&self.coefficients, runs, outputs)
     }
 
     fn facts(&self) -> Vec<Fact> {
-        self.summary.facts(self.basis.terms().len())
+        self.summary.facts(self.terms().len())
     }
 
     fn save(&self) -> Result<Vec<u8>, Stop> {
         let header = Header {
-            coordinates: self.basis.coordinates().to_vec(),
-            exponents: self.basis.terms().exponents().to_vec(),
+            coordinates: self.basis_coordinates(),
+            exponents: self.terms().exponents().to_vec(),
+            combined: self.functions.combined.as_ref().map(Matrix::columns),
             outputs: self.outputs(),
-            runs: self.fit_error.residuals.rows(),
+            runs: self.errors.residuals().rows(),
+            errors_of_components: matches!(self.errors, Errors::OfComponents(_)),
             summary: self.summary.clone(),
         };
         let numbers = [
+            self.functions.combined.as_ref().map_or(&[][..], Matrix::as_slice),
             self.coefficients.as_slice(),
-            &self.fit_error.relative,
-            self.fit_error.residuals.as_slice(),
+            self.errors.relative(),
+            self.errors.residuals().as_slice(),
+            match &self.errors {
+                Errors::OfOutputs(_) => &[],
+                Errors::OfComponents(errors) => &errors.factors,
+            },
         ];
         bytes::write(&header, &numbers)
     }
 
     fn tables(&self) -> Result<Tables, String> {
         let mut all = Tables::default();
-        tables::add_basis(&self.basis, &mut all)?;
-        all.matrix("coefficient", "term", "output", &self.coefficients);
+        tables::add_basis(&self.functions.basis, &mut all)?;
+        all.matrix("coefficient", "term", "output", &self.of_terms());
         Ok(all)
     }
 }
@@ -224,15 +298,16 @@ impl Linear for Expansion {
     }
 
     fn basis(&self, points: &Matrix) -> Matrix {
-        self.basis.values(points)
+        self.functions.values(points)
     }
 
     fn basis_gradient(&self, point: &[f64]) -> Matrix {
-        self.basis.gradient(point)
+        self.functions.gradient(point)
     }
 
     fn sum_of_squares(&self, factor: &Matrix) -> Option<Box<dyn SumOfSquares>> {
-        let squares = Squares::new(&self.basis, factor)?;
+        let factor = self.functions.factor_of_terms(factor);
+        let squares = Squares::new(&self.functions.basis, &factor)?;
         Some(Box::new(squares))
     }
 }

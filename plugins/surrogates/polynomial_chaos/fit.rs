@@ -15,7 +15,7 @@ use super::least_squares::Fit;
 use super::options::Solver;
 use super::output::{Output, moments, outputs};
 use super::quadrature::Projection;
-use super::reduction::Chosen;
+use super::reduction::{Chosen, Reduction};
 use super::search::{Best, Search};
 use super::slopes::{self, Slopes};
 use super::terms::{Basis, Sets};
@@ -26,6 +26,19 @@ const LOW_DEGREE: usize = 3;
 
 pub(super) fn fit(
     options: &PolynomialChaos,
+    training: &Training<'_>,
+    stream: &Stream,
+    progress: &Progress<'_>,
+) -> Result<Expansion, Stop> {
+    let Training { points, responses, .. } = training;
+    let reduction = options.reduction(points.rows(), responses.columns());
+    fit_with(options, reduction, training, stream, progress)
+}
+
+/// Like [`fit`], with components in place of the outputs as stated.
+pub(super) fn fit_with(
+    options: &PolynomialChaos,
+    reduction: Option<Reduction>,
     training: &Training<'_>,
     stream: &Stream,
     progress: &Progress<'_>,
@@ -42,6 +55,7 @@ pub(super) fn fit(
     let slopes = training.gradients.map(|g| Slopes::new(&coordinates, training.points, g));
     let problem = Problem {
         options,
+        reduction,
         points: training.points,
         coordinates,
         sets: options.sets(dimension),
@@ -116,6 +130,8 @@ pub(in crate::surrogates) fn check_numbers(training: &Training<'_>) -> Result<()
 /// Data shared by the fits of all outputs.
 pub(super) struct Problem<'a> {
     pub options: &'a PolynomialChaos,
+    /// Components in place of the outputs.
+    pub reduction: Option<Reduction>,
     pub points: &'a Matrix,
     pub coordinates: Vec<Coordinate>,
     pub sets: Sets,
@@ -145,7 +161,7 @@ impl Problem<'_> {
     /// Warns of outputs and errors that deserve caution.
     fn warn(&self, expansion: &Expansion, progress: &Progress<'_>) {
         let Summary { constant, poor, optimistic, .. } = expansion.summary();
-        let outputs = expansion.fit_error().relative.len();
+        let outputs = expansion.relative_error().len();
         if *constant > 0 {
             progress.warn(&format!(
                 "{constant} of {outputs} outputs do not vary over the runs and are emulated by their mean"
@@ -205,10 +221,9 @@ impl Problem<'_> {
         progress: &Progress<'_>,
     ) -> Result<Expansion, Stop> {
         let Training { responses, gradients, .. } = *training;
-        let runs = self.points.rows();
-        let Some(reduction) = self.options.reduction(runs, responses) else {
+        let Some(reduction) = self.reduction else {
             let outputs = self.outputs(responses, gradients);
-            return Ok(self.fits(&outputs, progress)?.expansion(None));
+            return Ok(self.fits(&outputs, progress)?.expansion());
         };
         let search = self.search();
         let scores_of = |components: &PrincipalComponents| {
@@ -221,7 +236,7 @@ impl Problem<'_> {
             reduction.chosen(responses, scores_of, &search, progress)?;
         let (_, variances) = moments(responses);
         let fits = self.refits(&search, &scores, &found)?;
-        Ok(fits.multiplied_back(&variances, &components))
+        Ok(fits.multiplied_back(&variances, components))
     }
 
     /// Returns the best fit of each output.

@@ -9,9 +9,11 @@ mod common_terms;
 mod coordinate;
 mod dictionary;
 mod emulator;
+mod errors;
 mod family;
 mod fit;
 mod fits;
+mod functions;
 mod gram;
 mod judge;
 mod least_angle;
@@ -25,6 +27,7 @@ mod paths;
 mod quadrature;
 mod recurrence;
 mod reduction;
+mod rotated;
 mod search;
 mod sensitivity;
 mod slopes;
@@ -335,6 +338,10 @@ impl Surrogate for PolynomialChaos {
         Ok(())
     }
 
+    fn rotated(&self, runs: usize, outputs: usize) -> Option<Box<dyn Surrogate>> {
+        Some(Box::new(rotated::Rotated::of(self, runs, outputs)?))
+    }
+
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop> {
         Ok(Box::new(Expansion::from_bytes(bytes)?))
     }
@@ -349,4 +356,4 @@ impl Surrogate for PolynomialChaos {
     }
 }
 
-lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"], revision = 4);
+lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"], revision = 5);

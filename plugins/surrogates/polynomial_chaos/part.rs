@@ -44,13 +44,11 @@ impl Problem<'_> {
         stream: &Stream,
         progress: &Progress<'_>,
     ) -> Result<Expansion, Stop> {
-        let runs = self.points.rows();
         let points = self.points.select_rows(part);
         let criterion = Criterion::new(self.options.selection, part.len(), stream);
         let search = Search { points: &points, criterion: &criterion, ..self.search() };
         let of_part = responses.select_rows(part);
-        let reduction = self.options.reduction(runs, responses);
-        let (components, mut found) = match reduction {
+        let (components, mut found) = match self.reduction {
             Some(reduction) => {
                 let scores_of = |c: &PrincipalComponents| outputs(&c.scores);
                 let chosen = reduction.chosen(&of_part, scores_of, &search, progress)?;
@@ -60,15 +58,15 @@ impl Problem<'_> {
         };
         let (means, variances) = moments(responses);
         if let Some(fits) = self.common(&found, responses, (&means, &variances), progress) {
-            return Ok(told(fits, part, true).expansion(None));
+            return Ok(told(fits, part, true).expansion());
         }
         let components = components.map(|c| c.of_all(responses));
         let all = outputs(components.as_ref().map_or(responses, |c| &c.scores));
         self.choose_rest(&all, &mut found)?;
         let fits = told(self.refits(&self.search(), &all, &found)?, part, false);
         Ok(match components {
-            Some(components) => fits.multiplied_back(&variances, &components),
-            None => fits.expansion(None),
+            Some(components) => fits.multiplied_back(&variances, components),
+            None => fits.expansion(),
         })
     }
 

@@ -29,8 +29,7 @@ pub(super) enum Reduction {
 
 impl PolynomialChaos {
     /// Returns the components that are fitted in place of the outputs, if any.
-    pub(super) fn reduction(&self, runs: usize, responses: &Matrix) -> Option<Reduction> {
-        let outputs = responses.columns();
+    pub(super) fn reduction(&self, runs: usize, outputs: usize) -> Option<Reduction> {
         let many = runs * outputs > MANY_VALUES && (runs > MANY_RUNS || outputs > MANY_OUTPUTS);
         match self.components {
             Some(Components::None) => None,
@@ -50,11 +49,10 @@ impl Reduction {
         search: &Search<'_>,
         progress: &Progress<'_>,
     ) -> Result<Chosen, Stop> {
-        let wanted = match self {
-            Self::Stated(components) => components,
-            Self::ByError => Components::Variance(1.0),
+        let components = match self {
+            Self::Stated(components) => components.of(responses)?,
+            Self::ByError => Components::resolved(responses)?,
         };
-        let components = wanted.of(responses)?;
         let mut scores = scores_of(&components);
         match self {
             Self::Stated(_) => {

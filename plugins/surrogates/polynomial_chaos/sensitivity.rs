@@ -46,6 +46,46 @@ pub(super) fn sensitivity(terms: &Terms, coefficients: &Matrix, dimension: usize
     Sensitivity { mean, variance, pairs, outputs, aggregated }
 }
 
+/// Like [`sensitivity`], with the coefficients of some outputs at a time.
+pub(super) fn of_blocks(
+    terms: &Terms,
+    blocks: impl Iterator<Item = Matrix>,
+    dimension: usize,
+) -> Sensitivity {
+    let mut all: Option<Sensitivity> = None;
+    for coefficients in blocks {
+        let block = sensitivity(terms, &coefficients, dimension);
+        match &mut all {
+            Some(all) => append(all, block),
+            None => all = Some(block),
+        }
+    }
+    let mut all = all.unwrap_or_default();
+    let Sensitivity { outputs, variance, .. } = &all;
+    // The sum over the outputs of variances that belong to some terms.
+    let sum = |m: &Matrix| {
+        let one = |j: usize| (0..m.rows()).map(|i| m[(i, j)] * variance[i]).sum::<f64>();
+        let sums = Matrix::from_fn(1, m.columns(), |_, j| one(j));
+        shares(&sums, &[variance.iter().sum()])
+    };
+    all.aggregated = outputs.map(sum);
+    all
+}
+
+/// Appends the outputs of another block.
+fn append(all: &mut Sensitivity, block: Sensitivity) {
+    all.mean.extend(block.mean);
+    all.variance.extend(block.variance);
+    let pairs = [
+        (&mut all.outputs.first, block.outputs.first),
+        (&mut all.outputs.total, block.outputs.total),
+        (&mut all.outputs.pairs, block.outputs.pairs),
+    ];
+    for (whole, part) in pairs {
+        part.iter_rows().for_each(|row| whole.push_row(row));
+    }
+}
+
 /// Adds the squares of one term's coefficients to a column.
 fn add_squares(sums: &mut Matrix, column: usize, coefficients: &[f64]) {
     for (o, c) in coefficients.iter().enumerate() {

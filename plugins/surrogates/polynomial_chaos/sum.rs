@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use lacuna::plugin::Forward as _;
-use lacuna::plugin::forward::Linear as _;
 use lacuna::plugin::surrogate::Summand;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
@@ -45,7 +44,7 @@ pub(super) fn sum(parts: &[Summand<'_>], offset: &[f64]) -> Result<Option<Expans
     let mut coefficients = Matrix::zeros(places.len(), outputs);
     add_scaled(coefficients.row_mut(constant), 1.0, offset);
     for ((part, expansion), rows) in parts.iter().zip(&loaded).zip(&rows) {
-        for (&row, own) in rows.iter().zip(expansion.coefficients().iter_rows()) {
+        for (&row, own) in rows.iter().zip(expansion.of_terms().iter_rows()) {
             let weighted = own.iter().zip(part.weights).map(|(c, w)| c * w);
             coefficients.row_mut(row).iter_mut().zip(weighted).for_each(|(sum, c)| *sum += c);
         }

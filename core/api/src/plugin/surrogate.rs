@@ -29,6 +29,13 @@ pub trait Surrogate: Component {
     /// Restores an emulator from the bytes that [`Emulator::save`] wrote.
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop>;
 
+    /// The surrogate for rotated outputs: from responses `Y Q`, with the rows of `Y` less their mean in the span of the
+    /// orthonormal columns of `Q`, it fits the emulator of `Y` times `Q`. `None` if the fit to this many values depends on
+    /// the axes of the outputs, or the emulator states its variance.
+    fn rotated(&self, _runs: usize, _outputs: usize) -> Option<Box<dyn Surrogate>> {
+        None
+    }
+
     /// The weighted sum of emulators that this surrogate fitted, with one weight per emulator and output and one offset
     /// per output, as one emulator of the same form. `None` if the method has no such form, or these emulators cannot
     /// be combined.
@@ -83,6 +90,16 @@ pub trait Emulator: Forward {
 
     /// Goodness of fit, estimated from the training runs.
     fn fit_error(&self) -> &FitError;
+
+    /// The error of each output, as [`FitError::relative`] has it.
+    fn relative_error(&self) -> &[f64] {
+        &self.fit_error().relative
+    }
+
+    /// Leave-one-out residuals of some runs and outputs, as [`FitError::residuals`] has them.
+    fn left_out(&self, runs: &[usize], outputs: &[usize]) -> Matrix {
+        self.fit_error().residuals.select(runs, outputs)
+    }
 
     /// Facts about the fit, for the report.
     fn facts(&self) -> Vec<Fact>;

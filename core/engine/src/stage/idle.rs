@@ -187,6 +187,14 @@ impl Emulator for Widened {
         self.emulator.fit_error()
     }
 
+    fn relative_error(&self) -> &[f64] {
+        self.emulator.relative_error()
+    }
+
+    fn left_out(&self, runs: &[usize], outputs: &[usize]) -> Matrix {
+        self.emulator.left_out(runs, outputs)
+    }
+
     fn facts(&self) -> Vec<Fact> {
         self.emulator.facts()
     }

@@ -2,10 +2,10 @@
 
 use lacuna::plugin::forward::Linear;
 use lacuna::plugin::{Emulator, Forward};
-use lacuna_linalg::{Matrix, multiply};
+use lacuna_linalg::{Matrix, multiply, multiply_transposed};
 
 use super::bench::{fitted, latin_hypercube, of_degree, scaled, up_to};
-use crate::surrogates::polynomial_chaos::{Expansion, PolynomialChaos, Solver};
+use crate::surrogates::polynomial_chaos::{Basis, Expansion, PolynomialChaos, Solver};
 use crate::surrogates::principal_components::Components;
 
 const BOX: [[f64; 2]; 2] = [[0.0, 2.0], [5.0, 6.0]];
@@ -46,7 +46,7 @@ fn what_components_leave_out_is_part_of_the_error() {
     let options = PolynomialChaos { components, ..up_to(1, 8) };
     let fit = fitted(&options, &BOX, &points, &responses).unwrap();
     let found = Components::Count(2).of(&responses).unwrap();
-    let truncation = found.truncation();
+    let truncation = found.truncation;
     let residuals = &fit.fit_error().residuals;
     for (o, &left) in truncation.iter().enumerate() {
         let mean_square = residuals.column(o).iter().map(|r| r * r).sum::<f64>() / 100.0;
@@ -100,4 +100,47 @@ fn many_runs_of_many_outputs_have_components_by_default() {
     assert!(reduction.components <= 64, "{reduction:?}");
     let error = many.fit_error().relative.iter().sum::<f64>() / 1000.0;
     assert!(reduction.left_out <= 0.02 * error, "{reduction:?} {error}");
+}
+
+/// Few components for many terms stay as they are. Their expansion in all terms has the same response, slopes and
+/// moments, and sums of squares have the same values, because both are the same linear combinations in another order.
+#[test]
+fn combinations_of_components_equal_the_expansion_in_all_terms() {
+    let (points, responses) = runs(150, 6);
+    let options = PolynomialChaos { components: Some(Components::Count(3)), ..up_to(1, 9) };
+    let fit = fitted(&options, &BOX, &points, &responses).unwrap();
+    let terms = fit.terms().len();
+    assert_eq!(fit.coefficients().rows(), 4, "{terms} terms");
+    let basis = Basis::new(fit.basis_coordinates(), fit.terms().clone());
+    let expanded = fit.clone().with(basis, fit.of_terms().into_owned());
+    assert_eq!(expanded.coefficients().rows(), terms);
+    let (fresh, _) = runs(20, 7);
+    let close = |a: &[f64], b: &[f64]| {
+        let size = b.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        assert!(a.len() == b.len() && a.iter().zip(b).all(|(x, y)| (x - y).abs() < 1e-11 * size));
+    };
+    close(fit.mean(&fresh).as_slice(), expanded.mean(&fresh).as_slice());
+    close(fit.jacobian(fresh.row(3)).as_slice(), expanded.jacobian(fresh.row(3)).as_slice());
+    let (own, all) = (fit.sensitivity().unwrap(), expanded.sensitivity().unwrap());
+    close(&own.mean, &all.mean);
+    close(&own.variance, &all.variance);
+    for (a, b) in [(&own.outputs, &all.outputs), (&own.aggregated, &all.aggregated)] {
+        close(a.first.as_slice(), b.first.as_slice());
+        close(a.total.as_slice(), b.total.as_slice());
+        close(a.pairs.as_slice(), b.pairs.as_slice());
+    }
+    let factor = Matrix::from_fn(5, 5, |i, j| ((3 * i + 7 * j) as f64).sin());
+    if let Some(squares) = fit.sum_of_squares(&factor) {
+        let functions = fit.basis(&fresh);
+        let extended = Matrix::from_fn(20, 5, |i, j| if j < 4 { functions[(i, j)] } else { 1.0 });
+        let product = multiply_transposed(&extended, &factor);
+        let direct: Vec<f64> = product.iter_rows().map(|r| r.iter().map(|x| x * x).sum()).collect();
+        close(&squares.values(&fresh), &direct);
+    }
+    // What is saved without combinations can be read, and a wrong number of them is damage.
+    assert_eq!(Expansion::from_bytes(&expanded.save().unwrap()).unwrap(), expanded);
+    let mut bytes = fit.save().unwrap();
+    let at = bytes.windows(12).position(|w| w == b"\"combined\":4").unwrap();
+    bytes[at + 11] = b'9';
+    assert!(Expansion::from_bytes(&bytes).is_err());
 }
