@@ -1,17 +1,21 @@
 //! Stage 4: fit of the emulator and estimation of its error.
 
+mod figures;
 mod fitted;
+mod refits;
+mod rotated;
 
 use std::borrow::Cow;
 
 use lacuna::data::{Ensemble, Parameter};
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Emulator, Fact, Surrogate};
-use lacuna::run::{Observer, Progress, Silent, Stop};
+use lacuna::run::{Observer, Progress, Stop};
 use lacuna_linalg::Matrix;
 use lacuna_run::{Folder, Kept, RunDirectory, Stage};
 use serde_json::json;
 
+use self::figures::{by_group, corrected, difference, inflation, mean, pairs, stacked};
 pub use self::fitted::{Errors, Fitted};
 use super::emulator_error::{self, Curves};
 use super::gradients::{self, Gradients};
@@ -26,6 +30,16 @@ use crate::study::file::InvalidRuns;
 /// Largest number of training runs whose error curves are kept, evenly spaced: their covariance is then known to one
 /// percent.
 const MOST_CURVES: usize = 5000;
+
+/// Number of values of error curves up to which as many are kept (512 MiB), and the number of curves that is kept however
+/// many outputs there are.
+const MOST_VALUES: usize = 1 << 26;
+const FEWEST_CURVES: usize = 50;
+
+/// Number of error curves that are kept.
+fn most_curves(outputs: usize) -> usize {
+    (MOST_VALUES / outputs.max(1)).clamp(FEWEST_CURVES, MOST_CURVES)
+}
 
 /// Input of a fit, and the folder in which it is kept.
 pub struct Fitting<'a> {
@@ -207,10 +221,10 @@ fn fit(fit: Fit<'_>, observer: &dyn Observer) -> Result<Fitted, Stop> {
     let simulated = ensemble.responses.select_rows(&fitting.validation);
     let emulated = emulator.mean(&test_points);
     let held_out = difference(&simulated, &emulated);
-    let shown = emulator_error::thinned(points.rows(), MOST_CURVES);
+    let shown = emulator_error::thinned(points.rows(), most_curves(responses.columns()));
     let left_out = corrected(&*emulator, &responses, &shown);
     let judged = if held_out.rows() > 0 { &held_out } else { &left_out };
-    let loo_by_output = emulator.fit_error().relative.clone();
+    let loo_by_output = emulator.relative_error().to_vec();
     let mut errors = Errors {
         training: fitting.training.len(),
         validation: fitting.validation.len(),
@@ -224,12 +238,7 @@ fn fit(fit: Fit<'_>, observer: &dyn Observer) -> Result<Fitted, Stop> {
         facts: emulator.facts(),
     };
     let runs = emulator_error::Runs { points: &points, responses: &responses };
-    let again = match fitting.purpose {
-        Purpose::Study => Curves::refitted(runs, |kept, left| {
-            fit.emulator(&points, &responses, kept, left, &Silent)
-        }),
-        Purpose::Gap(_) => Ok(None),
-    };
+    let again = fit.refitted(runs, &shown);
     let refitted = again.unwrap_or_else(|stop| {
         let why = format!(
             "by the leave-one-out formula, since a fit to nine tenths of the runs failed: {stop}"
@@ -243,11 +252,11 @@ fn fit(fit: Fit<'_>, observer: &dyn Observer) -> Result<Fitted, Stop> {
         errors: left_out.clone(),
         stated: None,
     });
+    let samples = stacked(left_out, &held_out);
+    let sample_points = stacked(shown_points, &test_points);
     let stated = emulator.variance(&test_points);
-    let validated = Curves { points: test_points.clone(), errors: held_out.clone(), stated };
+    let validated = Curves { points: test_points, errors: held_out, stated };
     let curves = curves.with(validated);
-    let samples = stacked(&left_out, &held_out);
-    let sample_points = stacked(&shown_points, &test_points);
     let active = fit.active(&responses);
     Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points, curves, active })
 }
@@ -314,13 +323,6 @@ impl Fit<'_> {
     }
 }
 
-fn inflation(emulator: &dyn Emulator, points: &Matrix, errors: &Matrix) -> Option<f64> {
-    let variance = emulator.variance(points).filter(|_| points.rows() >= 10)?;
-    let squares: f64 = errors.as_slice().iter().map(|e| e * e).sum();
-    let ratio = (squares / variance.as_slice().iter().sum::<f64>()).sqrt();
-    ratio.is_finite().then_some(ratio)
-}
-
 /// Rows of a matrix; nothing is copied if these are all rows in their order.
 fn rows_of<'a>(matrix: &'a Matrix, rows: &[usize]) -> Cow<'a, Matrix> {
     if rows.iter().copied().eq(0..matrix.rows()) {
@@ -328,63 +330,4 @@ fn rows_of<'a>(matrix: &'a Matrix, rows: &[usize]) -> Cow<'a, Matrix> {
     } else {
         Cow::Owned(matrix.select_rows(rows))
     }
-}
-
-/// Leave-one-out residuals of some training runs, scaled so that their mean square over all runs is the (corrected)
-/// leave-one-out error.
-fn corrected(emulator: &dyn Emulator, responses: &Matrix, runs: &[usize]) -> Matrix {
-    let error = emulator.fit_error();
-    let scale: Vec<f64> = (0..responses.columns())
-        .map(|j| {
-            let column = responses.column(j);
-            let centre = mean(column.iter().copied());
-            let variance = mean(column.iter().map(|y| (y - centre).powi(2)));
-            let square = mean(error.residuals.column(j).iter().map(|r| r * r));
-            let expected = error.relative[j] * variance;
-            // Residuals are only enlarged: a correction for the selection of terms cannot make the error smaller.
-            if square > 0.0 && expected > square { (expected / square).sqrt() } else { 1.0 }
-        })
-        .collect();
-    let residuals = &error.residuals;
-    Matrix::from_fn(runs.len(), scale.len(), |i, j| residuals[(runs[i], j)] * scale[j])
-}
-
-fn by_group(study: &Study, errors: &Matrix, loo: &[f64]) -> Vec<(String, f64, f64, f64)> {
-    let groups = study.layouts.groups();
-    let figures = |group: &lacuna::data::layout::Group| {
-        let all = || errors.iter_rows().flat_map(|row| group.indices.iter().map(|&i| row[i]));
-        let loo = mean(group.indices.iter().map(|&i| loo[i]));
-        (mean(all().map(f64::abs)), mean(all().map(|e| e * e)).sqrt(), loo)
-    };
-    groups
-        .iter()
-        .map(|group| {
-            let (mae, rmse, loo) = figures(group);
-            (group.name.clone(), mae, rmse, loo)
-        })
-        .collect()
-}
-
-/// At most about 3000 pairs of simulated and emulated values, evenly thinned.
-fn pairs(simulated: &Matrix, emulated: &Matrix) -> Vec<(f64, f64)> {
-    let step = (simulated.as_slice().len() / 3000).max(1);
-    let all = simulated.as_slice().iter().zip(emulated.as_slice());
-    all.step_by(step).map(|(a, b)| (*a, *b)).collect()
-}
-
-fn difference(a: &Matrix, b: &Matrix) -> Matrix {
-    Matrix::from_fn(a.rows(), a.columns(), |i, j| a[(i, j)] - b[(i, j)])
-}
-
-fn stacked(a: &Matrix, b: &Matrix) -> Matrix {
-    Matrix::from_rows(a.columns(), a.iter_rows().chain(b.iter_rows()))
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for value in values {
-        sum += value;
-        count += 1.0;
-    }
-    if count > 0.0 { sum / count } else { 0.0 }
 }

@@ -276,10 +276,14 @@ fn left_out(
 ) -> LeftOut {
     let known = fitted.sample_points.rows() - fitted.errors.validation;
     // Of thousands of runs the stage keeps the errors of some, the emulator those of all.
-    let all = (known < runs.len()).then(|| &emulator.fit_error().residuals);
-    let stated = fitted.curves.stated.as_ref().filter(|_| all.is_none());
+    let some = known < runs.len();
+    let stated = fitted.curves.stated.as_ref().filter(|_| !some);
     let Some(stated) = stated else {
-        let errors = all.unwrap_or(&fitted.samples).select(runs, outputs);
+        let errors = if some {
+            emulator.left_out(runs, outputs)
+        } else {
+            fitted.samples.select(runs, outputs)
+        };
         return LeftOut { errors, sizes: vec![1.0; runs.len()] };
     };
     let errors = fitted.curves.errors.select(runs, outputs);

@@ -1,5 +1,7 @@
 //! Errors of the emulator at runs on which it was not trained.
 
+use std::borrow::Cow;
+
 use lacuna::plugin::Emulator;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
@@ -50,11 +52,12 @@ impl Curves {
         mut fit: impl FnMut(&[usize], &[usize]) -> Result<Box<dyn Emulator>, Stop>,
     ) -> Result<Option<Self>, Stop> {
         let count = runs.points.rows();
-        if !(3..=REFITTED).contains(&count) {
+        if !Self::are_refitted(count) {
             return Ok(None);
         }
         let mut errors = Matrix::zeros(count, runs.responses.columns());
-        let mut stated: Option<Matrix> = Some(errors.clone());
+        // Of an emulator that states no variance there is nothing to keep.
+        let mut stated = Vec::new();
         for part in 0..PARTS.min(count) {
             let (left, kept): (Vec<usize>, Vec<usize>) =
                 (0..count).partition(|i| i % PARTS.min(count) == part);
@@ -66,19 +69,21 @@ impl Curves {
                 let row = runs.responses.row(i).iter().zip(mean.row(k));
                 errors.row_mut(i).iter_mut().zip(row).for_each(|(e, (y, m))| *e = y - m);
             }
-            stated = stated.zip(variance).map(|(mut all, variance)| {
-                left.iter()
-                    .enumerate()
-                    .for_each(|(k, &i)| all.row_mut(i).copy_from_slice(variance.row(k)));
-                all
-            });
+            stated.push(variance.map(|variance| (left, variance)));
         }
         if errors.as_slice().iter().any(|e| !e.is_finite()) {
             return Err(Stop::new(
                 "an emulator gives no finite response at a run that was left out",
             ));
         }
+        let stated: Option<Vec<_>> = stated.into_iter().collect();
+        let stated = stated.map(|parts| gathered(&parts, &errors));
         Ok(Some(Self { points: runs.points.clone(), errors, stated }))
+    }
+
+    /// Returns true if emulators are refitted for this number of training runs.
+    pub fn are_refitted(runs: usize) -> bool {
+        (3..=REFITTED).contains(&runs)
     }
 
     /// Appends other curves.
@@ -107,10 +112,20 @@ impl Curves {
     }
 
     /// The curves at runs inside the prior's support, or all if these are fewer than fifty.
-    pub fn near_prior(&self, study: &Study) -> Self {
+    pub fn near_prior(&self, study: &Study) -> Cow<'_, Self> {
         let rows = rows_near_prior(study, &self.points);
-        if rows.len() == self.points.rows() { self.clone() } else { self.select(&rows) }
+        let all = rows.len() == self.points.rows();
+        if all { Cow::Borrowed(self) } else { Cow::Owned(self.select(&rows)) }
     }
+}
+
+/// A matrix as large as another, from groups of its rows with their indices.
+fn gathered(parts: &[(Vec<usize>, Matrix)], like: &Matrix) -> Matrix {
+    let mut all = Matrix::zeros(like.rows(), like.columns());
+    for (rows, part) in parts {
+        rows.iter().zip(part.iter_rows()).for_each(|(&i, row)| all.row_mut(i).copy_from_slice(row));
+    }
+    all
 }
 
 /// Rows of the points inside the prior's support, or all rows if these are fewer than fifty.
