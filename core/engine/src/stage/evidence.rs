@@ -145,11 +145,17 @@ impl Weighed {
         let p = &predictor.densities;
         let data = p.data.count();
         let chosen = Chosen::of(calibrated, data);
+        let curves = Curves::of(p.data);
         let responses = predictions::responses(study, p, &chosen);
-        let Some(densities) = predictions::pointwise(study, p, &chosen, responses.as_deref())
-        else {
-            return Ok(self);
+        let densities = if predictions::are_held(&chosen, data) {
+            predictions::pointwise(study, p, &chosen, responses.as_deref())
+        } else {
+            self.left_out = predictions::left_out(study, p, &chosen, curves.of.clone());
+            None
         };
+        if densities.is_none() && self.left_out.is_none() {
+            return Ok(self);
+        }
         let count = chosen.points.rows();
         if !chosen.written {
             self.missing.push(format!(
@@ -157,14 +163,17 @@ impl Weighed {
                  `posterior.nc`"
             ));
         }
-        if let Some(responses) = responses.as_ref().filter(|_| chosen.written) {
-            let points = &chosen.points;
-            let new = predictions::simulated_from_posterior(study, predictor, responses, points);
-            let measured: Vec<f64> = p.data.values().collect();
-            self.below = probabilities_below(&measured, &new, &densities, chosen.efficiency);
+        if let Some(densities) = &densities {
+            if let Some(responses) = responses.as_ref().filter(|_| chosen.written) {
+                let points = &chosen.points;
+                let new =
+                    predictions::simulated_from_posterior(study, predictor, responses, points);
+                let measured: Vec<f64> = p.data.values().collect();
+                self.below = probabilities_below(&measured, &new, densities, chosen.efficiency);
+            }
+            let of = curves.of.clone();
+            self.left_out = Some(LeaveOneOut::of(densities, chosen.efficiency, of));
         }
-        let curves = Curves::of(p.data);
-        self.left_out = Some(LeaveOneOut::of(&densities, chosen.efficiency, curves.of.clone()));
         let work = curves.all.len().saturating_mul(count).saturating_mul(data);
         let Some(responses) = responses.filter(|_| work <= WORK) else {
             self.missing.push(format!(
