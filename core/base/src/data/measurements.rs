@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Layout, Layouts};
+use super::{Layout, Layouts, Shared};
 use crate::matrix::Matrix;
 
 /// Repeated measurements of one response; values may be missing.
@@ -10,8 +10,8 @@ use crate::matrix::Matrix;
 pub struct Measurements {
     /// Layout of one complete measurement.
     pub layout: Layout,
-    /// Replicates, in the order in which they were read.
-    pub replicates: Vec<Replicate>,
+    /// Replicates, in the order in which they were read. Copies of the measurements share them.
+    pub replicates: Shared<Vec<Replicate>>,
     /// Covariance of the noise of one complete measurement, `outputs x outputs`, in the squared unit of the response;
     /// `None` if the data do not state it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -23,8 +23,9 @@ pub struct Measurements {
 pub struct Replicate {
     /// Name of the replicate in the data, such as a pulse number.
     pub name: String,
-    /// Measured values, one per output of the layout; `None` where nothing was measured.
-    pub values: Vec<Option<f64>>,
+    /// Measured values, one per output of the layout; `None` where nothing was measured. Copies of the replicate share
+    /// them.
+    pub values: Shared<Vec<Option<f64>>>,
     /// Standard deviation of the noise of each value, in the unit of the response; zero where nothing was measured.
     /// `None` if the data do not state it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -34,7 +35,7 @@ pub struct Replicate {
 impl Replicate {
     /// A replicate without stated noise.
     pub fn new(name: impl Into<String>, values: Vec<Option<f64>>) -> Self {
-        Self { name: name.into(), values, sd: None }
+        Self { name: name.into(), values: values.into(), sd: None }
     }
 
     /// A copy that keeps only the values at outputs for which `kept` is true; the noise is kept unchanged.
@@ -71,13 +72,14 @@ impl Summary {
 impl Measurements {
     /// Measurements without stated noise.
     pub fn new(layout: Layout, replicates: Vec<Replicate>) -> Self {
-        Self { layout, replicates, covariance: None }
+        Self { layout, replicates: replicates.into(), covariance: None }
     }
 
     /// A copy with these replicates in place of the present ones; layout and stated covariance are kept.
     #[must_use]
     pub fn with_replicates(&self, replicates: Vec<Replicate>) -> Self {
-        Self { layout: self.layout.clone(), replicates, covariance: self.covariance.clone() }
+        let (layout, covariance) = (self.layout.clone(), self.covariance.clone());
+        Self { layout, replicates: replicates.into(), covariance }
     }
 
     /// Returns true if the data state the size of their noise.
@@ -106,22 +108,65 @@ impl Measurements {
     }
 
     /// Count, mean and scatter over the replicates, one entry per output.
+    ///
+    /// Replicates are passed one after the other, so that a large table is read in the order of memory.
     pub fn summaries(&self) -> Vec<Summary> {
-        (0..self.layout.len()).map(|i| self.summary(i)).collect()
+        let mut summaries = self.counted();
+        self.add_scatter(&mut summaries);
+        let stated = self.mean_stated_variances(&summaries);
+        for (summary, variance) in summaries.iter_mut().zip(stated) {
+            summary.stated = variance.map(f64::sqrt);
+        }
+        summaries
     }
 
-    fn summary(&self, i: usize) -> Summary {
-        let values = || self.replicates.iter().filter_map(|r| r.values[i]);
-        let count = values().count();
-        if count == 0 {
-            return Summary::default();
+    /// Count and mean of each output; the others are zero.
+    fn counted(&self) -> Vec<Summary> {
+        // Starts from -0.0, like the sum over an iterator.
+        let mut sums = vec![(0_usize, -0.0); self.layout.len()];
+        for replicate in &self.replicates {
+            for ((count, sum), y) in sums.iter_mut().zip(&replicate.values) {
+                if let Some(y) = y {
+                    *count += 1;
+                    *sum += y;
+                }
+            }
         }
-        let mean = values().sum::<f64>() / count as f64;
-        let scatter = values().map(|y| (y - mean).powi(2)).sum();
-        let measured = self.replicates.iter().filter(|r| r.values[i].is_some());
-        let stated: Option<Vec<f64>> = measured.map(|r| self.stated_variance(r, i)).collect();
-        let stated = stated.map(|of| (of.iter().sum::<f64>() / of.len() as f64).sqrt());
-        Summary { count, mean, scatter, stated }
+        let mean = |(count, sum): (usize, f64)| match count {
+            0 => Summary::default(),
+            _ => Summary { count, mean: sum / count as f64, ..Summary::default() },
+        };
+        sums.into_iter().map(mean).collect()
+    }
+
+    fn add_scatter(&self, summaries: &mut [Summary]) {
+        let measured = |summary: &&mut Summary| summary.count > 0;
+        summaries.iter_mut().filter(measured).for_each(|summary| summary.scatter = -0.0);
+        for replicate in &self.replicates {
+            for (summary, y) in summaries.iter_mut().zip(&replicate.values) {
+                if let Some(y) = y {
+                    summary.scatter += (y - summary.mean).powi(2);
+                }
+            }
+        }
+    }
+
+    /// Mean of the stated variances of each output over its values; `None` if one of them is not stated, or there is none.
+    fn mean_stated_variances(&self, summaries: &[Summary]) -> Vec<Option<f64>> {
+        if !self.states_noise() {
+            return vec![None; summaries.len()];
+        }
+        let measured = |s: &Summary| (s.count > 0).then_some(-0.0);
+        let mut sums: Vec<Option<f64>> = summaries.iter().map(measured).collect();
+        for replicate in &self.replicates {
+            let outputs = sums.iter_mut().zip(&replicate.values).enumerate();
+            for (i, (sum, _)) in outputs.filter(|(_, (_, y))| y.is_some()) {
+                let stated = self.stated_variance(replicate, i);
+                *sum = sum.and_then(|sum| Some(sum + stated?));
+            }
+        }
+        let mean = |(sum, s): (Option<f64>, &Summary)| sum.map(|sum| sum / s.count as f64);
+        sums.into_iter().zip(summaries).map(mean).collect()
     }
 
     /// The measured values of output `i`, in the order of the replicates.
