@@ -10,6 +10,7 @@ pub mod matlab;
 pub mod netcdf;
 mod noise;
 pub mod records;
+mod rows;
 pub mod runs;
 pub mod scenario;
 pub mod sheet;

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use csv::{ErrorKind, ReaderBuilder, StringRecord, Trim};
+use csv::StringRecord;
 use lacuna::data::Unit;
 use lacuna::plugin::reader::ReadError;
 
 use super::faults::Faults;
+use super::rows::Rows;
 use super::{ending, listed};
 
 /// Heading of a column, such as `time [s]`.
@@ -21,7 +22,7 @@ pub struct Heading {
 }
 
 /// A row below the headings.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Record {
     /// Line in the file, counted from 1.
     pub line: usize,
@@ -29,7 +30,17 @@ pub struct Record {
     pub cells: StringRecord,
 }
 
-/// A CSV file in memory.
+/// The last line of a file, which has no line end.
+pub(super) struct Ending<'a> {
+    /// Line in the file, counted from 1.
+    pub line: usize,
+    /// The last field of the line.
+    pub field: &'a str,
+    /// True if a quote of the file is not closed.
+    pub is_quote_open: bool,
+}
+
+/// A CSV file in memory. Without its records it describes the columns of a file that is read row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheet {
     /// Path of the file.
@@ -67,78 +78,51 @@ impl Sheet {
     /// Parses the lines that can be read, and collects the errors of the others, for callers that go on to check the
     /// cells. The sheet is complete only if there are no errors.
     pub fn scan(path: &Path, bytes: &[u8]) -> Result<(Self, Faults), ReadError> {
-        let mut reader = ReaderBuilder::new()
-            .delimiter(delimiter(bytes))
-            .comment(Some(b'#'))
-            .trim(Trim::All)
-            .from_reader(bytes);
-        let comma = delimiter(bytes) == b',';
-        let broken = |error: csv::Error| unequal(path, comma, &error);
-        let names = reader.headers().map_err(|error| broken(error).1)?.clone();
-        if names.iter().all(str::is_empty) {
-            return Err(ReadError::new(path, "is empty: expected a line of column names"));
+        let (mut sheet, mut rows, mut faults) = Rows::of(path, bytes, delimiter(bytes))?;
+        let mut record = Record::default();
+        while rows.next(&mut record, &mut faults) {
+            sheet.records.push(record.clone());
         }
-        let heading_line = names.position().map_or(1, |p| p.line() as usize);
-        let mut headings: Vec<Heading> = Vec::with_capacity(names.len());
-        let mut faults = Faults::default();
-        for (column, text) in names.iter().enumerate() {
-            let wrong = |message: String| {
-                ReadError::new(path, message)
-                    .at(format!("line {heading_line}, column {}", column + 1))
-            };
-            let heading = heading(text).map_err(&wrong)?;
-            if headings.iter().any(|h| h.text == heading.text) {
-                faults.note(
-                    heading_line,
-                    wrong(format!("two columns are called `{}`", heading.name)),
-                );
-            }
-            headings.push(heading);
-        }
-        let mut records = Vec::new();
-        for record in reader.records() {
-            match record {
-                Ok(record) => {
-                    let line = record.position().map_or(0, |p| p.line() as usize);
-                    records.push(Record { line, cells: record });
-                }
-                Err(error) => {
-                    let (line, error) = broken(error);
-                    faults.note(line, error);
-                }
-            }
-        }
-        let sheet = Self { path: path.to_owned(), headings, heading_line, records };
-        if let Some((line, error)) = sheet.cut(bytes) {
+        if let Some((line, error)) = sheet.end(bytes) {
             faults.note(line, error);
         }
         Ok((sheet, faults))
     }
 
-    /// Returns the error of a last line that seems to be cut off; see [`ending`].
-    fn cut(&self, bytes: &[u8]) -> Option<(usize, ReadError)> {
+    /// Returns the error of a last line of a file in memory that seems to be cut off.
+    fn end(&self, bytes: &[u8]) -> Option<(usize, ReadError)> {
         if bytes.ends_with(b"\n") || bytes.ends_with(b"\r") {
             return None;
         }
-        let last_line = bytes.rsplit(|&b| b == b'\n').next().unwrap_or_default();
-        if last_line.starts_with(b"#") {
+        if is_comment(bytes.rsplit(|&b| b == b'\n').next().unwrap_or_default()) {
             return None;
         }
         let (last, above) = self.records.split_last()?;
-        let column = self.headings.len() - 1;
         // A file is read once, so that a crate for counting bytes is not worthwhile.
         #[allow(clippy::naive_bytecount)]
         let quotes = bytes.iter().filter(|&&b| b == b'"').count();
-        let reason = if quotes % 2 == 1 {
+        let column = self.headings.len() - 1;
+        let field = &last.cells[column];
+        let ending = Ending { line: last.line, field, is_quote_open: quotes % 2 == 1 };
+        self.cut(&ending, above.iter().map(|record| &record.cells[column]))
+    }
+
+    /// Returns the error of a last line without a line end that seems to be cut off, given the last fields of the lines
+    /// above it; see [`ending`].
+    pub(super) fn cut<'a>(
+        &self,
+        last: &Ending<'_>,
+        above: impl Iterator<Item = &'a str>,
+    ) -> Option<(usize, ReadError)> {
+        let reason = if last.is_quote_open {
             "a quote is not closed".to_owned()
         } else {
-            let above = above.iter().map(|record| &record.cells[column]);
-            ending::cut(&last.cells[column], above)?
+            ending::cut(last.field, above)?
         };
         let text =
             format!("the file seems to be cut off: its last line has no line end, and {reason}");
         let error = self
-            .complain(last, column, text)
+            .complain_at(last.line, self.headings.len() - 1, text)
             .help("write the file again; if it is whole, end its last line with a line break");
         Some((last.line, error))
     }
@@ -165,8 +149,12 @@ impl Sheet {
         column: usize,
         message: impl Into<String>,
     ) -> ReadError {
+        self.complain_at(record.line, column, message)
+    }
+
+    fn complain_at(&self, line: usize, column: usize, message: impl Into<String>) -> ReadError {
         let name = &self.headings[column].name;
-        let place = format!("line {}, column {} (`{name}`)", record.line, column + 1);
+        let place = format!("line {line}, column {} (`{name}`)", column + 1);
         ReadError::new(&self.path, message).at(place)
     }
 
@@ -233,9 +221,14 @@ impl Conversion {
     }
 }
 
+/// Returns true for a line that is a comment.
+pub(super) fn is_comment(line: &[u8]) -> bool {
+    line.starts_with(b"#")
+}
+
 /// Determines the field separator of a table from its first line.
 pub(super) fn delimiter(bytes: &[u8]) -> u8 {
-    let first = bytes.split(|&b| b == b'\n').find(|line| !line.starts_with(b"#"));
+    let first = bytes.split(|&b| b == b'\n').find(|line| !is_comment(line));
     let first = first.unwrap_or_default();
     let has = |c: u8| first.contains(&c);
     match (has(b','), has(b';'), has(b'\t')) {
@@ -245,7 +238,8 @@ pub(super) fn delimiter(bytes: &[u8]) -> u8 {
     }
 }
 
-fn heading(text: &str) -> Result<Heading, String> {
+/// Reads a heading; fails if it ends in a unit that is none.
+pub(super) fn heading(text: &str) -> Result<Heading, String> {
     let whole = |name: &str, unit| Heading { text: text.to_owned(), name: name.to_owned(), unit };
     let Some((name, unit)) = text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) else {
         return Ok(whole(text, None));
@@ -255,24 +249,5 @@ fn heading(text: &str) -> Result<Heading, String> {
         // A parameter of one scenario, such as `height[ball 1]`.
         Err(_) if !name.ends_with(' ') => Ok(whole(text, None)),
         Err(error) => Err(error.to_string()),
-    }
-}
-
-/// Converts a parser error to one with its line.
-fn unequal(path: &Path, comma: bool, error: &csv::Error) -> (usize, ReadError) {
-    let line_of = |pos: &Option<csv::Position>| pos.as_ref().map_or(0, |p| p.line() as usize);
-    let at =
-        |line: usize, text: String| (line, ReadError::new(path, text).at(format!("line {line}")));
-    match error.kind() {
-        ErrorKind::UnequalLengths { pos, expected_len, len } => {
-            let text = format!("expected {expected_len} fields as in the first line, found {len}");
-            let (line, error) = at(line_of(pos), text);
-            let more = comma && len > expected_len;
-            let help =
-                "write decimals after a point, not a comma, and put a text with a comma in quotes";
-            (line, if more { error.help(help) } else { error })
-        }
-        ErrorKind::Utf8 { pos, .. } => at(line_of(pos), "is not UTF-8 text".to_owned()),
-        _ => (0, ReadError::new(path, format!("cannot be read: {error}"))),
     }
 }

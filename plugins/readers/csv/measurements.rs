@@ -1,21 +1,15 @@
 //! Replicated measurements in a long table.
 
-use std::collections::BTreeMap;
-
 use lacuna::data::layouts::SCENARIO;
-use lacuna::data::{Layout, Measurements, Replicate, Unit};
+use lacuna::data::{Layout, Measurements, Unit};
 use lacuna::plugin::reader::ReadError;
 
+use super::gathered::Gathered;
 use crate::readers::cells::LongColumns;
 use crate::readers::faults::Faults;
 use crate::readers::noise::{MASK, REPLICATE, SIGMA, left_out};
+use crate::readers::scenario::Part;
 use crate::readers::sheet::{Conversion, Record, Sheet};
-
-/// A replicate as its rows are read, with the line of each value.
-struct Rows {
-    replicate: Replicate,
-    lines: Vec<usize>,
-}
 
 /// Columns of a table.
 struct Columns<'a> {
@@ -36,47 +30,33 @@ struct Row<'a> {
 /// Name of the only replicate of a table without a column `replicate`.
 const ONLY: &str = "1";
 
-/// Reads the table: one replicate for each name in the column `replicate`, or a single one without that column.
+/// Reads the table row by row: one replicate for each name in the column `replicate`, or a single one without that column.
 pub(super) fn measurements(
-    (sheet, mut faults): (Sheet, Faults),
+    part: Part,
     layout: &Layout,
     ignore: &[String],
 ) -> Result<Measurements, ReadError> {
-    let sheet = &sheet;
+    let sheet = &part.sheet.clone();
     let columns = match Columns::find(sheet, layout, ignore) {
         Ok(columns) => columns,
         Err(error) => {
+            let mut faults = part.each(|_, _| {})?;
             faults.note(sheet.heading_line, error);
             return faults.or(Measurements::new(layout.clone(), Vec::new()));
         }
     };
-    let mut order: BTreeMap<&str, usize> = BTreeMap::new();
-    let mut found: Vec<Rows> = Vec::new();
-    for record in &sheet.records {
-        let Some(row) = faults.take(record.line, columns.row(sheet, record)) else { continue };
-        let number = *order.entry(row.replicate).or_insert_with(|| {
-            let mut replicate = Replicate::new(row.replicate, vec![None; layout.len()]);
-            replicate.sd = columns.sigma.is_some().then(|| vec![0.0; layout.len()]);
-            found.push(Rows { replicate, lines: vec![0; layout.len()] });
-            found.len() - 1
-        });
-        let rows = &mut found[number];
-        if rows.lines[row.place] > 0 {
-            let first = rows.lines[row.place];
+    let mut gathered = Gathered::new(layout, columns.sigma.is_some());
+    let mut faults = part.each(|record, faults| {
+        let Some(row) = faults.take(record.line, columns.row(sheet, record)) else { return };
+        let sd = row.value.map(|_| row.sd);
+        if let Err(first) = gathered.add(row.replicate, row.place, record.line, (row.value, sd)) {
             faults.note(record.line, columns.twice(sheet, record, layout, &row, first));
-            continue;
         }
-        rows.lines[row.place] = record.line;
-        rows.replicate.values[row.place] = row.value;
-        if let (Some(sd), Some(_)) = (&mut rows.replicate.sd, row.value) {
-            sd[row.place] = row.sd;
-        }
-    }
+    })?;
     if faults.is_empty() {
-        reject_absent(sheet, layout, &found, &mut faults);
+        reject_absent(sheet, layout, gathered.seen(), &mut faults);
     }
-    let replicates = found.into_iter().map(|rows| rows.replicate).collect();
-    faults.or(Measurements::new(layout.clone(), replicates))
+    faults.or(Measurements::new(layout.clone(), gathered.replicates()))
 }
 
 impl<'a> Columns<'a> {
@@ -151,17 +131,21 @@ impl<'a> Columns<'a> {
     }
 }
 
+/// Number of coordinates from which on repeated ones are removed while a table is read.
+const REPEATED: usize = 1 << 20;
+
 /// Returns the numbers of an axis that appear in the table, in increasing order and in `unit`.
-pub(super) fn grid(
-    (sheet, mut faults): (Sheet, Faults),
-    axis: &str,
-    unit: &Unit,
-) -> Result<Vec<f64>, ReadError> {
-    let sheet = &sheet;
+pub(super) fn grid(part: Part, axis: &str, unit: &Unit) -> Result<Vec<f64>, ReadError> {
+    let sheet = &part.sheet.clone();
     let column = sheet.column(axis)?;
     let conversion = sheet.conversion(column, unit)?;
-    let mut numbers = Vec::with_capacity(sheet.records.len());
-    for record in &sheet.records {
+    let mut numbers = Vec::new();
+    let different = |numbers: &mut Vec<f64>| {
+        numbers.sort_by(f64::total_cmp);
+        numbers.dedup();
+    };
+    let mut most = REPEATED;
+    let faults = part.each(|record, faults| {
         let x = sheet.number(record, column).and_then(|x| {
             let x = x.and_then(|x| conversion.apply(x)).filter(|x| x.is_finite());
             x.ok_or_else(|| {
@@ -171,9 +155,12 @@ pub(super) fn grid(
             })
         });
         numbers.extend(faults.take(record.line, x));
-    }
-    numbers.sort_by(f64::total_cmp);
-    numbers.dedup();
+        if numbers.len() >= most {
+            different(&mut numbers);
+            most = REPEATED.max(2 * numbers.len());
+        }
+    })?;
+    different(&mut numbers);
     faults.or(numbers)
 }
 
@@ -227,13 +214,11 @@ fn reject_unknown(
 }
 
 /// Rejects tables in which a sensor or a time of the response has no row at all, not even one without a value.
-fn reject_absent(sheet: &Sheet, layout: &Layout, found: &[Rows], faults: &mut Faults) {
+fn reject_absent(sheet: &Sheet, layout: &Layout, rows: &[bool], faults: &mut Faults) {
     let mut seen: Vec<Vec<bool>> = layout.axes.iter().map(|a| vec![false; a.len()]).collect();
-    for flat in 0..layout.len() {
-        if found.iter().any(|rows| rows.lines[flat] > 0) {
-            for (axis, i) in layout.place(flat).into_iter().enumerate() {
-                seen[axis][i] = true;
-            }
+    for flat in (0..layout.len()).filter(|&flat| rows[flat]) {
+        for (axis, i) in layout.place(flat).into_iter().enumerate() {
+            seen[axis][i] = true;
         }
     }
     for (axis, seen) in layout.axes.iter().zip(seen) {

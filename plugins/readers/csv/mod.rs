@@ -1,6 +1,7 @@
 //! `csv`: runs and measurements in text tables.
 
 mod ensemble;
+mod gathered;
 mod inspect;
 mod measurements;
 
@@ -17,8 +18,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::cells::LongColumns;
-use super::faults::Faults;
 use super::runs;
+use super::scenario::Part;
 use super::sheet::Sheet;
 use super::sierra::heartbeat;
 use super::{noise, scenario};
@@ -172,9 +173,9 @@ impl Reader for Csv {
             ReadError::new(source.directory, "there is no table of measurements")
                 .help("name it with `path`")
         })?;
-        let sheet = self.measured(source.directory, path, source.scenario)?;
+        let part = self.measured(source.directory, path, source.scenario)?;
         let known: Vec<String> = self.ignore.iter().chain(&self.groups).cloned().collect();
-        let mut data = measurements::measurements(sheet, source.layout, &known)?;
+        let mut data = measurements::measurements(part, source.layout, &known)?;
         let file = |path: &PathBuf| scenario_path(source.directory, path, source.scenario);
         if let Some(mask) = self.mask.as_ref().map(file) {
             noise::apply_mask(&mask, source.layout, &mut data)?;
@@ -194,8 +195,8 @@ impl Reader for Csv {
             ReadError::new(source.directory, "there is no table of measurements")
                 .help("name it with `path`")
         })?;
-        let sheet = self.measured(source.directory, path, source.scenario)?;
-        measurements::grid(sheet, source.axis, source.unit)
+        let part = self.measured(source.directory, path, source.scenario)?;
+        measurements::grid(part, source.axis, source.unit)
     }
 
     fn groups(&self, directory: &Path) -> Result<Option<Groups>, ReadError> {
@@ -241,9 +242,9 @@ impl Csv {
         directory: &Path,
         path: &Path,
         scenario: Option<&str>,
-    ) -> Result<(Sheet, Faults), ReadError> {
+    ) -> Result<Part, ReadError> {
         let named = self.groups.as_deref().unwrap_or(SCENARIO);
-        scenario::sheet(directory, path, scenario, &self.ignore, named)
+        Part::open(directory, path, scenario, &self.ignore, named)
     }
 }
 

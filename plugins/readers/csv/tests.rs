@@ -142,6 +142,35 @@ fn measurements_keep_gaps() {
     assert_eq!(read.replicates[1].values, [None, None, None, Some(5.0)]);
 }
 
+/// Rows in the order of the response, column by column, backwards, and between comments are the same measurements, and a
+/// second value is told with the line of the first.
+#[test]
+fn the_order_of_the_rows_does_not_matter() {
+    let row = |r: usize, i: usize| {
+        let (sensor, time) = (["B", "C"][i / 2], 10 + 10 * (i % 2));
+        format!("p{r},{sensor},{time},{}\n", 10 * r + i)
+    };
+    let heading = "replicate,sensor,time [us],strain\n";
+    let ordered: Vec<(usize, usize)> = (0..20).map(|k| (k / 4, k % 4)).collect();
+    let by_column: Vec<(usize, usize)> = (0..20).map(|k| (k % 5, k / 5)).collect();
+    let backwards: Vec<(usize, usize)> = (0..20).map(|k| (k / 4, [0, 3, 2, 1][k % 4])).collect();
+    let text = |rows: &[(usize, usize)], between: &str| {
+        let rows: Vec<String> = rows.iter().map(|&(r, i)| row(r, i) + between).collect();
+        heading.to_owned() + &rows.concat()
+    };
+    let expected = measured(&text(&ordered, ""), Csv::default()).unwrap();
+    for (rows, between) in [(&ordered, "# same\n"), (&by_column, ""), (&backwards, "")] {
+        let text = text(rows, between);
+        assert_eq!(measured(&text, Csv::default()).unwrap(), expected);
+        for first in [0, 7, 19] {
+            let (r, i) = rows[first];
+            let error = measured(&(text.clone() + &row(r, i)), Csv::default()).unwrap_err();
+            let line = 2 + first * if between.is_empty() { 1 } else { 2 };
+            assert!(error.ends_with(&format!("the first is in line {line}")), "{error}");
+        }
+    }
+}
+
 #[test]
 fn rows_belong_to_the_scenario_that_they_name() {
     let folder = tempfile::tempdir().unwrap();

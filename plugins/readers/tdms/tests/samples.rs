@@ -49,7 +49,7 @@ fn measured(options: &str, layout: &Layout) -> Result<Vec<Option<f64>>, String> 
     let directory = sample("");
     let source = MeasurementSource { directory: &directory, scenario: None, layout };
     let found = reader.measurements(&source).map_err(|e| e.to_string())?;
-    Ok(found.replicates[0].values.clone())
+    Ok(found.replicates[0].values.to_vec())
 }
 
 /// Times are those of the waveform, from 10 us on every 10 us; `step` and `first` take their place.
