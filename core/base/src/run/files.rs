@@ -114,9 +114,16 @@ pub fn hash(bytes: &[u8]) -> String {
 pub fn hash_numbers(text: &str, arrays: &[&[f64]]) -> String {
     let mut hasher = Sha256::new();
     hasher.update(text.as_bytes());
-    for number in arrays.iter().copied().flatten() {
-        hasher.update(number.to_le_bytes());
-    }
+    hashed(hasher, arrays.iter().copied().flatten().copied())
+}
+
+/// SHA-256 of numbers, in hexadecimal.
+pub fn hash_of(numbers: impl Iterator<Item = f64>) -> String {
+    hashed(Sha256::new(), numbers)
+}
+
+fn hashed(mut hasher: Sha256, numbers: impl Iterator<Item = f64>) -> String {
+    numbers.for_each(|number| hasher.update(number.to_le_bytes()));
     in_hexadecimal(hasher.finalize().as_slice())
 }
 

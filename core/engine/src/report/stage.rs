@@ -225,8 +225,7 @@ fn measurements(study: &Study, measured: &Measured) -> MeasuredFindings {
 /// Hash of the data in the likelihood; the evidences of two runs are comparable only if it is equal.
 fn fingerprint(data: &Observations) -> String {
     let values = data.blocks.iter().flat_map(|b| &b.replicates).flat_map(|r| &r.values);
-    let bytes: Vec<u8> = values.flat_map(|y| y.unwrap_or(f64::NAN).to_le_bytes()).collect();
-    files::hash(&bytes)
+    files::hash_of(values.map(|y| y.unwrap_or(f64::NAN)))
 }
 
 fn surrogate(

@@ -22,6 +22,7 @@ use crate::stage::screen::FlaggedCurve;
 use crate::study::Study;
 
 mod ensembles;
+mod measured;
 pub(super) mod outside;
 
 pub use ensembles::{Runs, ensemble, ensemble_of, ensemble_through, ensemble_with_failed};
@@ -63,8 +64,8 @@ struct Labels {
 
 impl Artifact for Data {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
-        files::write_json(&folder.join(MEASUREMENTS), &self.measured)?;
-        let Some(e) = &self.ensemble else { return Ok(vec![MEASUREMENTS.to_owned()]) };
+        let mut names = measured::save(folder, self.measured.as_ref())?;
+        let Some(e) = &self.ensemble else { return Ok(names) };
         let arrays = [
             Array::matrix("points", "run", "parameter", &e.points),
             Array::matrix("responses", "run", "output", &e.responses),
@@ -79,11 +80,12 @@ impl Artifact for Data {
             failed: e.failed.clone(),
         };
         files::write_json(&folder.join("ensemble.json"), &labels)?;
-        Ok(["ensemble.nc", "ensemble.json", MEASUREMENTS].map(str::to_owned).to_vec())
+        names.extend(["ensemble.nc", "ensemble.json"].map(str::to_owned));
+        Ok(names)
     }
 
     fn load(folder: &Path) -> Result<Self, Stop> {
-        let measured = files::read_json(&folder.join(MEASUREMENTS))?;
+        let measured = measured::load(folder)?;
         let path = folder.join("ensemble.nc");
         if !path.is_file() {
             return Ok(Self { ensemble: None, measured, cheaper: None });
@@ -102,8 +104,6 @@ impl Artifact for Data {
         Ok(Self { ensemble: Some(ensemble), measured, cheaper: None })
     }
 }
-
-const MEASUREMENTS: &str = "measurements.json";
 
 impl Data {
     /// Simulation runs of a study with a surrogate.
@@ -255,22 +255,17 @@ fn observations(study: &Study, reader: &dyn Reader) -> Result<Observations, Vec<
         };
         let block = ranges.iter().position(|range| range.contains(&outputs.start)).unwrap_or(0);
         let begin = outputs.start - ranges[block].start;
-        for replicate in read.replicates {
-            let mut values = vec![None; ranges[block].len()];
-            values[begin..begin + replicate.values.len()].copy_from_slice(&replicate.values);
-            let name = match label {
-                Some(label) => format!("{label} {}", replicate.name),
-                None => replicate.name,
-            };
-            let sd = replicate.sd.map(|own| {
-                let mut sd = vec![0.0; ranges[block].len()];
-                sd[begin..begin + own.len()].copy_from_slice(&own);
-                sd
-            });
-            blocks[block].replicates.push(Replicate { name, values, sd });
+        let size = ranges[block].len();
+        let is_whole = |replicate: &Replicate| replicate.values.len() == size;
+        let is_first = label.is_none() && blocks[block].replicates.is_empty();
+        if is_first && read.replicates.iter().all(is_whole) {
+            blocks[block].replicates = read.replicates;
+        } else {
+            let replicates = read.replicates.into_iter();
+            let padded = replicates.map(|replicate| padded(replicate, label, begin, size));
+            blocks[block].replicates.extend(padded);
         }
         if let Some(own) = read.covariance {
-            let size = ranges[block].len();
             let all = blocks[block].covariance.get_or_insert_with(|| Matrix::zeros(size, size));
             for (i, row) in own.iter_rows().enumerate() {
                 all.row_mut(begin + i)[begin..begin + row.len()].copy_from_slice(row);
@@ -282,6 +277,22 @@ fn observations(study: &Study, reader: &dyn Reader) -> Result<Observations, Vec<
     }
     blocks.iter().try_for_each(stated_throughout).map_err(|stop| vec![stop])?;
     Ok(Observations { blocks })
+}
+
+/// A replicate of a scenario among `size` outputs of its block, of which the scenario has those from `begin` on.
+fn padded(replicate: Replicate, label: Option<&str>, begin: usize, size: usize) -> Replicate {
+    let mut values = vec![None; size];
+    values[begin..begin + replicate.values.len()].copy_from_slice(&replicate.values);
+    let name = match label {
+        Some(label) => format!("{label} {}", replicate.name),
+        None => replicate.name,
+    };
+    let sd = replicate.sd.map(|own| {
+        let mut sd = vec![0.0; size];
+        sd[begin..begin + own.len()].copy_from_slice(&own);
+        sd
+    });
+    Replicate { sd, ..Replicate::new(name, values) }
 }
 
 /// Requires that noise is stated for all replicates of a block or for none: a likelihood would have to guess the rest.

@@ -105,6 +105,9 @@ pub fn without(data: &Measurements, flagged: &[FlaggedCurve]) -> Measurements {
 /// interval `mean +- 1.96 sd` of a replicate.
 pub fn with_added_curves(data: &Measurements, curves: &[AddedCurve]) -> Measurements {
     let mut extended = data.clone();
+    if curves.is_empty() {
+        return extended;
+    }
     let summaries = data.summaries();
     for curve in curves {
         let (name, shift) = match curve {
