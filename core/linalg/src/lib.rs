@@ -30,7 +30,7 @@ pub use packed::PackedUpper;
 pub use product::{
     gram, gram_lower, multiply, multiply_lower, multiply_transposed, transposed_multiply,
 };
-pub use qr::{LeastSquares, Qr, least_squares, thin_qr};
+pub use qr::{LeastSquares, Qr, least_squares, thin_qr, triangular_factor};
 pub use svd::{Svd, thin_svd};
 pub use triangular::{
     solve_lower, solve_lower_matrix, solve_lower_transposed, solve_upper, solve_upper_matrix,

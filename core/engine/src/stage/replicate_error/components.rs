@@ -19,8 +19,8 @@ use super::basis::{Curve, KINDS, POINTS};
 
 /// Coefficients of all curves in all replicates.
 pub(super) struct Fits {
-    /// Coefficient by kind, replicate and curve; `None` where it was not measured.
-    coefficients: Vec<Vec<Vec<Option<f64>>>>,
+    /// Coefficient by kind, then by replicate and curve; `None` where it was not measured.
+    coefficients: Vec<Vec<Option<f64>>>,
     /// Variance of a coefficient by white noise, by kind and curve.
     white: Vec<Vec<f64>>,
     /// Number of replicates of each curve.
@@ -52,41 +52,64 @@ struct Noise {
 }
 
 impl Fits {
-    /// Fits the functions of each curve to the deviations of each replicate, and subtracts them.
-    pub fn of(curves: &[Curve], deviations: &mut [Vec<Option<f64>>]) -> Self {
-        let empty = || vec![vec![None; curves.len()]; deviations.len()];
+    /// Fits the functions of each curve to the deviations of each replicate, subtracts them, and gives what is left to
+    /// `rest`, replicate by replicate.
+    pub fn of(
+        curves: &[Curve],
+        deviations: impl Iterator<Item = Vec<Option<f64>>>,
+        mut rest: impl FnMut(Vec<Option<f64>>),
+    ) -> Self {
         let mut fits = Self {
-            coefficients: (0..KINDS).map(|_| empty()).collect(),
+            coefficients: vec![Vec::new(); KINDS],
             white: vec![vec![0.0; curves.len()]; KINDS],
             replicates: vec![0; curves.len()],
         };
-        for (k, curve) in curves.iter().enumerate() {
-            let kinds: Vec<usize> = curve.kinds().collect();
-            let mut noise = Noise::default();
-            for (r, deviations) in deviations.iter_mut().enumerate() {
-                let Some(found) = fitted(curve, &kinds, deviations, &mut noise) else { continue };
+        let kinds: Vec<Vec<usize>> = curves.iter().map(|curve| curve.kinds().collect()).collect();
+        let mut noise: Vec<Noise> = curves.iter().map(|_| Noise::default()).collect();
+        for mut deviations in deviations {
+            for all in &mut fits.coefficients {
+                all.resize(all.len() + curves.len(), None);
+            }
+            for (k, curve) in curves.iter().enumerate() {
+                let found = fitted(curve, &kinds[k], &mut deviations, &mut noise[k]);
+                let Some(found) = found else { continue };
                 fits.replicates[k] += 1;
-                for (&kind, value) in kinds.iter().zip(found) {
-                    fits.coefficients[kind][r][k] = Some(value);
+                for (&kind, value) in kinds[k].iter().zip(found) {
+                    let first = fits.coefficients[kind].len() - curves.len();
+                    fits.coefficients[kind][first + k] = Some(value);
                 }
             }
-            let share = 1.0 - 1.0 / fits.replicates[k].max(1) as f64;
-            let variance = noise.squares / (noise.freedom * share).max(f64::MIN_POSITIVE);
-            let all: Vec<usize> = (0..curve.outputs.len()).collect();
-            let Ok(cholesky) = Cholesky::new(&gram(curve, &kinds, &all)) else { continue };
-            for (place, &kind) in kinds.iter().enumerate() {
-                let mut inverse = vec![0.0; kinds.len()];
-                inverse[place] = 1.0;
-                cholesky.solve(&mut inverse);
-                fits.white[kind][k] = variance * inverse[place] / size(curve, kind, &all).powi(2);
-            }
+            rest(deviations);
+        }
+        for (k, (curve, noise)) in curves.iter().zip(&noise).enumerate() {
+            fits.add_white(k, curve, noise);
         }
         fits
     }
 
+    /// Sets the variances of the coefficients of a curve by white noise.
+    fn add_white(&mut self, k: usize, curve: &Curve, noise: &Noise) {
+        let kinds: Vec<usize> = curve.kinds().collect();
+        let share = 1.0 - 1.0 / self.replicates[k].max(1) as f64;
+        let variance = noise.squares / (noise.freedom * share).max(f64::MIN_POSITIVE);
+        let all: Vec<usize> = (0..curve.outputs.len()).collect();
+        let Ok(cholesky) = Cholesky::new(&gram(curve, &kinds, &all)) else { return };
+        for (place, &kind) in kinds.iter().enumerate() {
+            let mut inverse = vec![0.0; kinds.len()];
+            inverse[place] = 1.0;
+            cholesky.solve(&mut inverse);
+            self.white[kind][k] = variance * inverse[place] / size(curve, kind, &all).powi(2);
+        }
+    }
+
+    /// Coefficients of this kind, for each replicate by curve; none without curves.
+    fn rows(&self, kind: usize) -> impl Iterator<Item = &[Option<f64>]> {
+        self.coefficients[kind].chunks(self.replicates.len().max(1))
+    }
+
     /// Curves with a deviation of this kind, for each replicate.
     pub fn measured(&self, kind: usize) -> impl Iterator<Item = Vec<usize>> + '_ {
-        self.coefficients[kind].iter().map(|row| present(row).map(|(k, _)| k).collect())
+        self.rows(kind).map(|row| present(row).map(|(k, _)| k).collect())
     }
 
     /// Variances of a kind of deviation; `None` if no curve has it in two replicates.
@@ -99,7 +122,7 @@ impl Fits {
         }
         let (mut squares, mut expected, mut share) = (0.0, 0.0, 0.0);
         let mut freedom = [0.0; 2];
-        for row in &self.coefficients[kind] {
+        for row in self.rows(kind) {
             let total: f64 = present(row).map(|(k, _)| weight[k]).sum();
             let curves = present(row).count() as f64;
             if curves == 0.0 {
@@ -130,13 +153,13 @@ impl Fits {
     /// Variance of the own part.
     fn own(&self, kind: usize) -> f64 {
         let white = &self.white[kind];
-        let squares = self.coefficients[kind].iter().flat_map(|row| present(row));
+        let squares = self.rows(kind).flat_map(present);
         let (sum, count) = squares.fold((0.0, 0.0), |(sum, n), (_, a)| (sum + a * a, n + 1.0));
         let mut own = if count > 0.0 { sum / count } else { 0.0 };
         for _ in 0..ROUNDS {
             let weight = |k: usize| 1.0 / (white[k] + own);
             let (mut squares, mut known, mut slope) = (0.0, 0.0, 0.0);
-            for row in &self.coefficients[kind] {
+            for row in self.rows(kind) {
                 let total: f64 = present(row).map(|(k, _)| weight(k)).sum();
                 let mean = present(row).map(|(k, a)| weight(k) * a).sum::<f64>() / total;
                 for (k, a) in present(row) {
@@ -160,7 +183,7 @@ impl Fits {
 
     /// Variances of coefficients without noise: that of all of them, as if the curves shared nothing and everything.
     fn without_noise(&self, kind: usize) -> Option<Components> {
-        let all = self.coefficients[kind].iter().flat_map(|row| present(row));
+        let all = self.rows(kind).flat_map(present);
         let (sum, share) = all.fold((0.0, 0.0), |(s, f), (k, a)| (s + a * a, f + self.share(k)));
         let variance = sum / share * enlarged(share);
         let components = |variance| Components {

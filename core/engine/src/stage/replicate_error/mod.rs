@@ -18,6 +18,7 @@
 
 mod basis;
 mod components;
+mod directions;
 
 use lacuna::data::measurements::Summary;
 use lacuna::data::{Measurements, Replicate};
@@ -26,6 +27,7 @@ use lacuna_linalg::Matrix;
 
 use self::basis::{Curve, KINDS};
 use self::components::{Components, Fits};
+use self::directions::Directions;
 use super::read::Measured;
 use crate::study::Study;
 
@@ -49,15 +51,14 @@ pub fn needs_best_fit(study: &Study, measured: &Measured) -> bool {
 /// replicates.
 pub fn of_replicates(data: &Measurements, response: Option<&[f64]>) -> Option<CommonError> {
     let summaries = data.summaries();
-    let used: Vec<&Replicate> =
-        data.replicates.iter().filter(|r| r.values.iter().any(Option::is_some)).collect();
-    if used.len() < FEWEST {
+    let used = || data.replicates.iter().filter(|r| r.values.iter().any(Option::is_some));
+    if used().count() < FEWEST {
         return None;
     }
-    let mut rest: Vec<Vec<Option<f64>>> =
-        used.iter().map(|replicate| deviations(replicate, &summaries)).collect();
+    let deviations = used().map(|replicate| deviations(replicate, &summaries));
     let curves = response.map_or_else(Vec::new, |y| basis::curves(&data.layout, y, &summaries));
-    let fits = Fits::of(&curves, &mut rest);
+    let mut directions = Directions::of(data.layout.len());
+    let fits = Fits::of(&curves, deviations, |rest| directions.add(&sampled(&rest, &summaries)));
     let mut columns = Vec::new();
     for kind in 0..KINDS {
         if let Some(components) = fits.components(kind) {
@@ -65,7 +66,7 @@ pub fn of_replicates(data: &Measurements, response: Option<&[f64]>) -> Option<Co
             columns.extend(own(&components, (&curves, kind), &summaries));
         }
     }
-    columns.extend(rest.iter().map(|rest| sampled(rest, &summaries)));
+    columns.extend(directions.into_columns());
     let factor = Matrix::from_fn(data.layout.len(), columns.len(), |i, k| columns[k][i]);
     Some(CommonError { origin: ErrorOrigin::Replicates, factor, predictive: false })
 }
