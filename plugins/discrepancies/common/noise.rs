@@ -2,12 +2,14 @@
 
 use std::sync::{Arc, OnceLock};
 
-use lacuna::data::{Measurements, Unit};
+use lacuna::data::measurements::Summary;
+use lacuna::data::{Measurements, Replicate, Unit};
+use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::discrepancy::{CommonError, ErrorPath, Hyperparameter, Known, VariancePart};
 use lacuna::run::Stop;
 
-use super::{By, Groups, Normal, PerGroup, Replicates, Unknown, Variance, squared};
+use super::{By, Groups, Normal, PerGroup, Places, Replicates, Unknown, Variance, squared};
 
 /// The data of a study and the errors common to all replicates, from which replicates are predicted and simulated.
 #[derive(Debug, Clone)]
@@ -18,6 +20,10 @@ pub struct Setting {
     pub common: Arc<[CommonError]>,
     /// Those that a new replicate has, as parts of its variance; made when they are asked for.
     common_parts: Arc<OnceLock<Vec<VariancePart>>>,
+    /// Number of values of each output.
+    counts: Vec<usize>,
+    /// Places of the values, made when they are asked for.
+    places: OnceLock<Places>,
     /// Variance of each output stated by the data, or else the variance between replicates pooled over its group;
     /// `None` without either.
     replicated: Option<Vec<f64>>,
@@ -125,7 +131,12 @@ impl Setting {
         } else {
             Pooled::of(groups, replicates).by_output(groups)
         };
-        Self { data: data.clone(), common, common_parts: Arc::default(), replicated }
+        let mut counts = vec![0; data.layout.len()];
+        for (&i, count) in replicates.measured.iter().zip(&replicates.count) {
+            counts[i] = *count as usize;
+        }
+        let (common_parts, places) = (Arc::default(), OnceLock::new());
+        Self { data: data.clone(), common, common_parts, counts, places, replicated }
     }
 
     /// Splits the variance of a new replicate into parts: `measurement`, up to the variance that replicates show;
@@ -196,14 +207,13 @@ impl Setting {
     /// Returns the data with the measured values of each replicate replaced by those that `values` makes from the
     /// replicate's stream.
     pub fn replaced(&self, stream: &Stream, values: impl Fn(&Stream) -> Vec<f64>) -> Measurements {
-        let mut data = self.data.clone();
-        for (r, replicate) in data.replicates.iter_mut().enumerate() {
+        let one = |(r, replicate): (usize, &Replicate)| {
             let new = values(&stream.named("replicate").at(r as u64));
-            for (value, new) in replicate.values.iter_mut().zip(new) {
-                *value = value.map(|_| new);
-            }
-        }
-        data
+            let measured = replicate.values.iter().zip(new);
+            let values = measured.map(|(value, new)| value.map(|_| new)).collect();
+            Replicate { values, ..replicate.clone() }
+        };
+        self.data.with_replicates(self.data.replicates.iter().enumerate().map(one).collect())
     }
 
     /// Returns data with independent normal noise of these variances about a mean curve.
@@ -215,9 +225,43 @@ impl Setting {
         })
     }
 
+    /// Outputs and values of the data with these indices, which increase.
+    pub fn values_at(&self, indices: &[usize]) -> impl Iterator<Item = (usize, f64)> {
+        let places = self.places.get_or_init(|| Places::of(&self.data));
+        indices.iter().filter_map(|&index| places.value(&self.data, index))
+    }
+
     /// Like [`Setting::noisy`], about a response with randomly drawn common errors.
     pub fn simulate(&self, response: &[f64], variance: &[f64], stream: &Stream) -> Measurements {
         self.noisy(&self.with_common_errors(response, stream), variance, stream)
+    }
+
+    /// Count, mean and scatter of each output of such data: the mean is normal, and the scatter has the law of a variance
+    /// times a chi-square; they are independent. `None` if the data state their noise.
+    pub fn simulate_summaries(
+        &self,
+        response: &[f64],
+        variance: &[f64],
+        stream: &Stream,
+    ) -> Option<Vec<Summary>> {
+        if self.data.states_noise() {
+            return None;
+        }
+        let mean = self.with_common_errors(response, stream);
+        let mut rng = stream.named("summaries").generator();
+        let mut one = |i: usize| {
+            let (count, v) = (self.counts[i], variance[i]);
+            if count == 0 {
+                return Summary::default();
+            }
+            let n = count as f64;
+            let mean = mean[i] + (v / n).sqrt() * normal(&mut rng);
+            let chi_square = |shape: f64| Distribution::Gamma([shape, 2.0]);
+            let freedom = 0.5 * (n - 1.0);
+            let scatter = if count > 1 { v * chi_square(freedom).sample(&mut rng) } else { 0.0 };
+            Summary { count, mean, scatter, stated: None }
+        };
+        Some((0..self.counts.len()).map(&mut one).collect())
     }
 }
 

@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use lacuna::data::Measurements;
+use lacuna::data::measurements::Summary;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::Fact;
 use lacuna::plugin::discrepancy::{
@@ -126,6 +127,23 @@ impl GaussianLikelihood {
         self.noise.by_output(&groups.iter().map(mean).collect::<Vec<f64>>())
     }
 
+    /// Returns the variance of each output, drawn from its posterior given the data and this response if it is integrated
+    /// out.
+    fn drawn_variance(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<f64> {
+        let mut rng = stream.named("variance").generator();
+        let groups = self.variances(response, hyper).unwrap_or_default();
+        let mut draw = |nodes: &Vec<(f64, f64)>| {
+            let mut left = if nodes.len() > 1 { uniform(&mut rng) } else { 0.0 };
+            let chosen = nodes.iter().find(|(_, p)| {
+                left -= p;
+                left <= 0.0
+            });
+            chosen.or(nodes.last()).map_or(0.0, |node| node.0)
+        };
+        let variance: Vec<f64> = groups.iter().map(&mut draw).collect();
+        self.noise.by_output(&variance)
+    }
+
     /// Returns the contribution of the common errors to the density of a value given all others, for each variance
     /// (row) and measured output of the group (column): the expected error, and the reduction of the precision.
     fn shares(group: &Statistics, along: &[f64], nodes: &[(f64, f64)]) -> (Matrix, Matrix) {
@@ -139,6 +157,30 @@ impl GaussianLikelihood {
             directions[(r, k)] * directions[(r, k)]
         });
         (lacuna_linalg::multiply(&pulled, directions), lacuna_linalg::multiply(&share, &squares))
+    }
+
+    /// Returns the log density of each of these values, given with their outputs, given all others.
+    fn left_out_of_values(
+        &self,
+        response: &[f64],
+        hyper: &[f64],
+        values: impl Iterator<Item = (usize, f64)>,
+    ) -> Option<Vec<f64>> {
+        let split = self.split(response);
+        let nodes = self.law.variances(&self.spreads(), hyper, &residuals(&split))?;
+        let mut place = vec![(0, 0); response.len()];
+        for (g, group) in self.groups.iter().enumerate() {
+            group.measured.iter().enumerate().for_each(|(k, &i)| place[i] = (g, k));
+        }
+        let groups = self.groups.iter().zip(&split).zip(&nodes);
+        let shares: Vec<_> =
+            groups.map(|((group, (along, _)), nodes)| Self::shares(group, along, nodes)).collect();
+        let one = |(i, y): (usize, f64)| {
+            let (g, k) = place[i];
+            let (group, scale) = (&self.groups[g], &self.noise.scale);
+            Self::left_out_of(group, &shares[g], scale, k, &nodes[g], y - response[i])
+        };
+        Some(values.map(one).collect())
     }
 
     /// Returns the log density of a value of the `k`-th measured output given all others; `difference` is the value
@@ -250,21 +292,15 @@ impl Likelihood for GaussianLikelihood {
             let solved = normal.solve(response, &variance)?;
             return Some(normal.left_out(&solved, data, response, &variance));
         }
-        let split = self.split(response);
-        let nodes = self.law.variances(&self.spreads(), hyper, &residuals(&split))?;
-        let mut place = vec![(0, 0); response.len()];
-        for (g, group) in self.groups.iter().enumerate() {
-            group.measured.iter().enumerate().for_each(|(k, &i)| place[i] = (g, k));
+        self.left_out_of_values(response, hyper, values(data))
+    }
+
+    fn left_out_at(&self, response: &[f64], hyper: &[f64], data: &[usize]) -> Option<Vec<f64>> {
+        if self.normal().is_some() {
+            let all = self.left_out(response, hyper)?;
+            return data.iter().map(|&i| all.get(i).copied()).collect();
         }
-        let groups = self.groups.iter().zip(&split).zip(&nodes);
-        let shares: Vec<_> =
-            groups.map(|((group, (along, _)), nodes)| Self::shares(group, along, nodes)).collect();
-        let one = |(i, y): (usize, f64)| {
-            let (g, k) = place[i];
-            let (group, scale) = (&self.groups[g], &self.noise.scale);
-            Self::left_out_of(group, &shares[g], scale, k, &nodes[g], y - response[i])
-        };
-        Some(values(data).map(one).collect())
+        self.left_out_of_values(response, hyper, self.noise.setting.values_at(data))
     }
 
     fn is_cheap(&self) -> bool {
@@ -286,18 +322,18 @@ impl Likelihood for GaussianLikelihood {
 
     /// Variances that are integrated out are drawn from their posterior given the data and this response.
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
-        let mut rng = stream.named("variance").generator();
-        let groups = self.variances(response, hyper).unwrap_or_default();
-        let mut draw = |nodes: &Vec<(f64, f64)>| {
-            let mut left = if nodes.len() > 1 { uniform(&mut rng) } else { 0.0 };
-            let chosen = nodes.iter().find(|(_, p)| {
-                left -= p;
-                left <= 0.0
-            });
-            chosen.or(nodes.last()).map_or(0.0, |node| node.0)
-        };
-        let variance: Vec<f64> = groups.iter().map(&mut draw).collect();
-        vec![self.noise.setting.simulate(response, &self.noise.by_output(&variance), stream)]
+        let variance = self.drawn_variance(response, hyper, stream);
+        vec![self.noise.setting.simulate(response, &variance, stream)]
+    }
+
+    fn simulate_summaries(
+        &self,
+        response: &[f64],
+        hyper: &[f64],
+        stream: &Stream,
+    ) -> Option<Vec<Vec<Summary>>> {
+        let variance = self.drawn_variance(response, hyper, stream);
+        Some(vec![self.noise.setting.simulate_summaries(response, &variance, stream)?])
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -229,3 +229,59 @@ fn simulated_data_have_the_gaps_of_the_measurements_and_the_variance_asked_for()
     let bound = 4.0 * 0.25 * f64::sqrt(2.0 / count);
     assert!((squares / count - 0.25).abs() < bound);
 }
+
+#[test]
+fn some_densities_of_left_out_data_are_those_of_all() {
+    let data = data(8);
+    for error in [&[][..], &[common(9)][..]] {
+        let full = likelihood(&data, error);
+        let response = random_matrix(1, OUTPUTS, 10);
+        let all = full.left_out(response.row(0), &[0.7]).unwrap();
+        let which: Vec<usize> = (0..all.len()).filter(|i| i % 3 != 1).collect();
+        let some = full.left_out_at(response.row(0), &[0.7], &which).unwrap();
+        let expected: Vec<f64> = which.iter().map(|&i| all[i]).collect();
+        assert_eq!(some, expected);
+    }
+}
+
+/// Means and scatters drawn without the data have the distribution of those of simulated data: their means and variances
+/// over many simulations agree within five standard errors, with common errors too.
+#[test]
+fn simulated_summaries_are_those_of_simulated_data() {
+    let data = data(12);
+    let full = likelihood(&data, &[common(13)]);
+    let response = vec![1.0; OUTPUTS];
+    let count = 4000;
+    let each = |number: &dyn Fn(u64, usize) -> f64, i: usize| {
+        let values: Vec<f64> = (0..count).map(|k| number(k, i)).collect();
+        let mean = values.iter().sum::<f64>() / count as f64;
+        let squares: Vec<f64> = values.iter().map(|x| (x - mean).powi(2)).collect();
+        let variance = squares.iter().sum::<f64>() / count as f64;
+        let fourth = squares.iter().map(|s| (s - variance).powi(2)).sum::<f64>() / count as f64;
+        [(mean, variance / count as f64), (variance, fourth / count as f64)]
+    };
+    let simulated: Vec<_> = (0..count)
+        .map(|k| full.simulate(&response, &[0.25], &Stream::root(14).at(k))[0].summaries())
+        .collect();
+    let drawn: Vec<_> = (0..count)
+        .map(|k| full.simulate_summaries(&response, &[0.25], &Stream::root(15).at(k)).unwrap())
+        .collect();
+    for i in 0..OUTPUTS {
+        assert_eq!(simulated[0][i].count, drawn[0][0][i].count);
+        let pairs = [
+            (
+                each(&|k, i| simulated[k as usize][i].mean, i),
+                each(&|k, i| drawn[k as usize][0][i].mean, i),
+            ),
+            (
+                each(&|k, i| simulated[k as usize][i].scatter, i),
+                each(&|k, i| drawn[k as usize][0][i].scatter, i),
+            ),
+        ];
+        for ([a, b], [c, d]) in pairs {
+            for ((a, of_a), (c, of_c)) in [(a, c), (b, d)] {
+                assert!((a - c).abs() <= 5.0 * (of_a + of_c).sqrt(), "{i}: {a} and {c}");
+            }
+        }
+    }
+}

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use lacuna_base::data::measurements::Summary;
 use lacuna_base::data::{Layout, Measurements, Parameter, Unit};
 use lacuna_base::math::distribution::Distribution;
 use lacuna_base::math::random::{Stream, normal};
@@ -239,6 +240,12 @@ pub trait Likelihood: Send + Sync {
         None
     }
 
+    /// Some of the numbers of [`Likelihood::left_out`]: those with these indices, which increase.
+    fn left_out_at(&self, response: &[f64], hyper: &[f64], data: &[usize]) -> Option<Vec<f64>> {
+        let all = self.left_out(response, hyper)?;
+        Some(data.iter().map(|&i| all.get(i).copied().unwrap_or(f64::NAN)).collect())
+    }
+
     /// This likelihood for a part of its data, as [`Discrepancy::likelihood_of_part`] makes it from all that is known,
     /// but with whatever is the same for both: the same values and derivatives in a fraction of the time. `None` if there
     /// is nothing to save.
@@ -290,6 +297,17 @@ pub trait Likelihood: Send + Sync {
     /// Data simulated from this discrepancy: replicates and missing values as in the measurements, new values; one set
     /// per block of scenarios.
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements>;
+
+    /// Count, mean and scatter of each output of data simulated as by [`Likelihood::simulate`], drawn from their own
+    /// distribution without the data; one list per block of scenarios. `None` if the discrepancy has no such form.
+    fn simulate_summaries(
+        &self,
+        _response: &[f64],
+        _hyper: &[f64],
+        _stream: &Stream,
+    ) -> Option<Vec<Vec<Summary>>> {
+        None
+    }
 
     /// Treatment of the common errors by a likelihood that samples some of their directions and omits the rest; `None`
     /// if it contains their whole covariance.

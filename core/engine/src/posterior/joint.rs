@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use lacuna::data::measurements::Summary;
 use lacuna::data::{Layouts, Measurements};
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::{Compressed, ErrorPath, SampledErrors, VariancePart};
@@ -131,6 +132,14 @@ impl Likelihood for Joint {
         Some(self.blocks.iter().map(one).collect::<Option<Vec<_>>>()?.concat())
     }
 
+    fn left_out_at(&self, response: &[f64], hyper: &[f64], data: &[usize]) -> Option<Vec<f64>> {
+        if let [block] = &self.blocks[..] {
+            return block.likelihood.left_out_at(response, &block.own(hyper), data);
+        }
+        let all = self.left_out(response, hyper)?;
+        data.iter().map(|&i| all.get(i).copied()).collect()
+    }
+
     /// The blocks share none of the sampled errors.
     fn sampled_errors(&self, hyper: &[f64]) -> Option<SampledErrors> {
         let of = |block: &Block| block.likelihood.sampled_errors(&block.own(hyper));
@@ -220,6 +229,20 @@ impl Likelihood for Joint {
             block.likelihood.simulate(part, &block.own(hyper), &stream.at(i as u64))
         };
         self.blocks.iter().enumerate().flat_map(one).collect()
+    }
+
+    fn simulate_summaries(
+        &self,
+        response: &[f64],
+        hyper: &[f64],
+        stream: &Stream,
+    ) -> Option<Vec<Vec<Summary>>> {
+        let one = |(i, block): (usize, &Block)| {
+            let (part, own) = (&response[block.outputs.clone()], block.own(hyper));
+            block.likelihood.simulate_summaries(part, &own, &stream.at(i as u64))
+        };
+        let all: Option<Vec<_>> = self.blocks.iter().enumerate().map(one).collect();
+        all.map(|all| all.concat())
     }
 
     fn facts(&self) -> Vec<Fact> {

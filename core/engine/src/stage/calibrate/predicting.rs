@@ -1,6 +1,7 @@
 //! Predictions of new data by a discrepancy that samples the common errors.
 
 use lacuna::data::Measurements;
+use lacuna::data::measurements::Summary;
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::{CommonError, ErrorPath, Hyperparameter, VariancePart};
 use lacuna::plugin::{Fact, Likelihood};
@@ -75,6 +76,16 @@ impl Likelihood for Added {
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
         let mean = CommonError::added(&self.errors, response, stream);
         self.alone.simulate(&mean, &self.own(hyper), stream)
+    }
+
+    fn simulate_summaries(
+        &self,
+        response: &[f64],
+        hyper: &[f64],
+        stream: &Stream,
+    ) -> Option<Vec<Vec<Summary>>> {
+        let mean = CommonError::added(&self.errors, response, stream);
+        self.alone.simulate_summaries(&mean, &self.own(hyper), stream)
     }
 
     fn facts(&self) -> Vec<Fact> {
