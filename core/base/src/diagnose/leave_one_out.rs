@@ -5,11 +5,14 @@
 //! Vehtari, Computational Statistics 36 (2021) 1243). The part left out may be a whole curve, with the joint density of
 //! its values.
 
+mod sample;
+
 use std::cmp::Ordering;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+pub use self::sample::{Approximation, Sampled};
 use super::pareto::{limit, smooth_dependent};
 use crate::math::moments::{log_sum, mean};
 use crate::matrix::Matrix;
@@ -63,6 +66,9 @@ pub struct LeaveOneOut {
     pub data: Vec<Left>,
     /// Index of the curve each datum belongs to, counted from 0; empty if it is not known.
     pub curve: Vec<usize>,
+    /// The sample that `data` are, if the sums over all data were estimated from one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampled: Option<Sampled>,
 }
 
 impl LeaveOneOut {
@@ -89,6 +95,7 @@ impl LeaveOneOut {
             limit,
             data,
             curve,
+            sampled: None,
         }
     }
 }
@@ -144,6 +151,9 @@ pub fn compare(a: &LeaveOneOut, b: &LeaveOneOut) -> Result<Difference, String> {
         ));
     }
     let differences: Vec<f64> = a.data.iter().zip(&b.data).map(|(a, b)| a.elpd - b.elpd).collect();
+    if let (Some(own), Some(other)) = (&a.sampled, &b.sampled) {
+        return sample::compare((a.elpd, own), (b.elpd, other), &differences);
+    }
     let by_curve = error_by_curve(&differences, &a.curve).filter(|_| a.curve == b.curve);
     Ok(Difference {
         elpd: differences.iter().sum(),

@@ -16,9 +16,12 @@ const STEPS: usize = 100_000;
 const SAMPLES: u64 = 4000;
 
 /// Returns the log density of each left-out part under each study, `parts x studies`; `None` if the studies have other
-/// parts, or fewer than two.
+/// parts, fewer than two, or a sample of them, whose sums are not those of all.
 pub(super) fn densities(left_out: &[&LeaveOneOut]) -> Option<Matrix> {
     let parts = left_out.first()?.data.len();
+    if left_out.iter().any(|one| one.sampled.is_some()) {
+        return None;
+    }
     if parts < 2 || left_out.len() < 2 || left_out.iter().any(|one| one.data.len() != parts) {
         return None;
     }

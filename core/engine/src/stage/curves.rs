@@ -83,6 +83,20 @@ impl Curves {
     }
 }
 
+/// For each datum, in their order, whether it is the first of its replicate and scenario.
+pub fn beginnings(data: &Observations) -> impl Iterator<Item = bool> {
+    data.blocks.iter().flat_map(|block| {
+        let scenarios = block.layout.axes.first().filter(|axis| axis.name == SCENARIO);
+        let length = block.layout.len() / scenarios.map_or(1, |axis| axis.len().max(1));
+        block.replicates.iter().flat_map(move |replicate| {
+            let mut last = None;
+            let measured =
+                (0..replicate.values.len()).filter(move |&i| replicate.values[i].is_some());
+            measured.map(move |i| last.replace(i / length) != Some(i / length))
+        })
+    })
+}
+
 /// Output indices of each scenario of a block.
 fn scenarios(layout: &Layout) -> Parts {
     match layout.axes.first().filter(|axis| axis.name == SCENARIO) {
@@ -199,6 +213,8 @@ mod tests {
         assert_eq!(names(&curves), ["hot p0", "hot p1", "cold p1", "wet p0"]);
         assert_eq!(curves.of, [0, 1, 1, 2, 2, 3]);
         assert_eq!(curves.of.len(), data.count());
+        let firsts: Vec<bool> = beginnings(&data).collect();
+        assert_eq!(firsts, [true, true, false, true, false, true]);
     }
 
     #[test]

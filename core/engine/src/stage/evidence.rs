@@ -3,6 +3,7 @@
 //! [`compare`](crate::compare) compares these results for several studies of the same data.
 
 mod kept;
+mod sampled;
 
 use lacuna::data::Draws;
 use lacuna::diagnose::leave_one_out::{LeaveOneOut, probabilities_below};
@@ -14,7 +15,7 @@ use serde_json::json;
 
 use super::calibrate::Calibrated;
 use super::curves::{self, Curves};
-use super::predictions::{self, Chosen, Predictor};
+use super::predictions::{self, Chosen, Predicting, Predictor};
 use super::stream;
 use crate::page::number::significant;
 use crate::posterior::{Posterior, bridge};
@@ -144,41 +145,26 @@ impl Weighed {
     ) -> Result<Self, Stop> {
         let p = &predictor.densities;
         let data = p.data.count();
-        let chosen = Chosen::of(calibrated, data);
-        let curves = Curves::of(p.data);
+        let many = data > sampled::MANY;
+        let chosen = Chosen::of(calibrated, if many { sampled::SIZE } else { data });
         let responses = predictions::responses(study, p, &chosen);
-        let densities = if predictions::are_held(&chosen, data) {
-            predictions::pointwise(study, p, &chosen, responses.as_deref())
+        let some = if many {
+            self.of_sample(study, p, &chosen, responses.as_deref())
         } else {
-            self.left_out = predictions::left_out(study, p, &chosen, curves.of.clone());
-            None
+            self.of_all(study, predictor, &chosen, responses.as_deref())
         };
-        if densities.is_none() && self.left_out.is_none() {
+        if !some {
             return Ok(self);
         }
+        let whole = curves::beginnings(p.data).filter(|first| *first).count();
         let count = chosen.points.rows();
-        if !chosen.written {
+        let work = |curves: usize| curves.saturating_mul(count).saturating_mul(data);
+        let curves = (work(whole) <= WORK).then(|| Curves::of(p.data));
+        let number = curves.as_ref().map_or(whole, |curves| curves.all.len());
+        let curves = curves.filter(|_| work(number) <= WORK);
+        let (Some(responses), Some(curves)) = (responses, curves) else {
             self.missing.push(format!(
-                "leave-one-out predictions of {data} data use {count} draws and are too many to be written to \
-                 `posterior.nc`"
-            ));
-        }
-        if let Some(densities) = &densities {
-            if let Some(responses) = responses.as_ref().filter(|_| chosen.written) {
-                let points = &chosen.points;
-                let new =
-                    predictions::simulated_from_posterior(study, predictor, responses, points);
-                let measured: Vec<f64> = p.data.values().collect();
-                self.below = probabilities_below(&measured, &new, densities, chosen.efficiency);
-            }
-            let of = curves.of.clone();
-            self.left_out = Some(LeaveOneOut::of(densities, chosen.efficiency, of));
-        }
-        let work = curves.all.len().saturating_mul(count).saturating_mul(data);
-        let Some(responses) = responses.filter(|_| work <= WORK) else {
-            self.missing.push(format!(
-                "leave-one-out predictions of curves are omitted: {} curves of {data} data are too many",
-                curves.all.len()
+                "leave-one-out predictions of curves are omitted: {number} curves of {data} data are too many"
             ));
             return Ok(self);
         };
@@ -196,5 +182,54 @@ impl Weighed {
         let of = |densities| LeaveOneOut::of(densities, chosen.efficiency, Vec::new());
         self.curves_left_out = self.by_curve.as_ref().map(of);
         Ok(self)
+    }
+
+    /// Adds the prediction of each datum; false if the discrepancy has none.
+    fn of_all(
+        &mut self,
+        study: &Study,
+        predictor: &Predictor<'_>,
+        chosen: &Chosen,
+        responses: Option<&[Vec<f64>]>,
+    ) -> bool {
+        let p = &predictor.densities;
+        let Some(densities) = predictions::pointwise(study, p, chosen, responses) else {
+            return false;
+        };
+        if !chosen.written {
+            let (data, count) = (p.data.count(), chosen.points.rows());
+            self.missing.push(format!(
+                "leave-one-out predictions of {data} data use {count} draws and are too many to be written to \
+                 `posterior.nc`"
+            ));
+        }
+        if let Some(responses) = responses.filter(|_| chosen.written) {
+            let points = &chosen.points;
+            let new = predictions::simulated_from_posterior(study, predictor, responses, points);
+            let measured: Vec<f64> = p.data.values().collect();
+            self.below = probabilities_below(&measured, &new, &densities, chosen.efficiency);
+        }
+        let curves = Curves::of(p.data);
+        self.left_out = Some(LeaveOneOut::of(&densities, chosen.efficiency, curves.of));
+        true
+    }
+
+    /// Adds the predictions of a sample of many data; false if the discrepancy has none.
+    fn of_sample(
+        &mut self,
+        study: &Study,
+        p: &Predicting<'_>,
+        chosen: &Chosen,
+        responses: Option<&[Vec<f64>]>,
+    ) -> bool {
+        self.left_out = sampled::left_out(study, p, chosen, responses);
+        let (data, size) = (p.data.count(), sampled::SIZE);
+        if self.left_out.is_some() {
+            self.missing.push(format!(
+                "leave-one-out predictions of {data} data are estimated from {size} of them and are too many to be written \
+                 to `posterior.nc`"
+            ));
+        }
+        self.left_out.is_some()
     }
 }

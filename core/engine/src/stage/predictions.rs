@@ -1,11 +1,7 @@
 //! Predictions of the data at selected draws of the posterior: the log density of each datum, and simulated data.
 
-use std::ops::Range;
-
 use lacuna::data::{Draws, Measurements, Observations};
 use lacuna::diagnose::chains;
-use lacuna::diagnose::leave_one_out::{LeaveOneOut, Left};
-use lacuna::diagnose::pareto::limit;
 use lacuna::math::moments::mean;
 use lacuna::math::random::Stream;
 use lacuna::plugin::{Forward, Likelihood};
@@ -51,12 +47,8 @@ const WRITTEN: usize = 10_000_000;
 /// Largest number of response values held at once.
 const HELD: usize = 1 << 24;
 
-/// Number of draws processed together for long records, and of values up to which they are.
+/// Number of draws processed together for long records.
 const TOGETHER: usize = 40;
-const TOGETHER_VALUES: usize = 1 << 25;
-
-/// Largest number of log densities held at once (512 MiB).
-const DENSITIES: usize = 1 << 26;
 
 /// Selected draws of the posterior, chain by chain.
 #[derive(Debug, Clone, PartialEq)]
@@ -144,29 +136,6 @@ pub fn responses(study: &Study, p: &Predicting<'_>, chosen: &Chosen) -> Option<V
     held.then(|| predict::responses(study, p.forward, &chosen.points))
 }
 
-/// Leave-one-out prediction of each datum, a part of the data at a time; `None` if the discrepancy has no such form.
-/// `curve` is the curve of each datum.
-pub fn left_out(
-    study: &Study,
-    p: &Predicting<'_>,
-    chosen: &Chosen,
-    curve: Vec<usize>,
-) -> Option<LeaveOneOut> {
-    let data: Vec<usize> = (0..p.data.count()).collect();
-    let mut left = Vec::with_capacity(data.len());
-    for part in data.chunks((DENSITIES / chosen.points.rows().max(1)).max(1)) {
-        let densities = pointwise_of(study, p, chosen, None, &(part[0]..part[0] + part.len()))?;
-        let one = |k: usize| Left::of(&densities.column(k), chosen.efficiency);
-        left.par_extend((0..part.len()).into_par_iter().map(one));
-    }
-    Some(LeaveOneOut::sum(left, limit(chosen.points.rows()), curve))
-}
-
-/// Returns true if the log densities of this many data at the draws are few enough to be held together.
-pub fn are_held(chosen: &Chosen, data: usize) -> bool {
-    chosen.points.rows() * data <= DENSITIES
-}
-
 /// Log density of each datum given all others and the parameters, `draws x data`; `None` if the discrepancy has no such
 /// form.
 pub fn pointwise(
@@ -175,23 +144,37 @@ pub fn pointwise(
     chosen: &Chosen,
     responses: Option<&[Vec<f64>]>,
 ) -> Option<Matrix> {
-    pointwise_of(study, p, chosen, responses, &(0..p.data.count()))
+    let all = |response: &[f64], hyper: &[f64]| p.likelihood.left_out(response, hyper);
+    by_draw(study, p, chosen, responses, &all)
 }
 
-/// Like [`pointwise`], for some of the data.
-fn pointwise_of(
+/// Like [`pointwise`], for the data with these indices, which increase.
+pub fn pointwise_at(
     study: &Study,
     p: &Predicting<'_>,
     chosen: &Chosen,
     responses: Option<&[Vec<f64>]>,
-    data: &Range<usize>,
+    data: &[usize],
+) -> Option<Matrix> {
+    let some = |response: &[f64], hyper: &[f64]| p.likelihood.left_out_at(response, hyper, data);
+    by_draw(study, p, chosen, responses, &some)
+}
+
+/// Log densities from the response and the hyperparameters of a draw.
+type Densities<'a> = dyn Fn(&[f64], &[f64]) -> Option<Vec<f64>> + Sync + 'a;
+
+fn by_draw(
+    study: &Study,
+    p: &Predicting<'_>,
+    chosen: &Chosen,
+    responses: Option<&[Vec<f64>]>,
+    densities: &Densities<'_>,
 ) -> Option<Matrix> {
     let count = chosen.points.rows();
     let own = p.likelihood.hyperparameters().len();
-    let together = TOGETHER.min(TOGETHER_VALUES / p.data.count().max(1)).max(2);
     let mut all: Option<Matrix> = None;
-    for first in (0..count).step_by(together) {
-        let rows: Vec<usize> = (first..count.min(first + together)).collect();
+    for first in (0..count).step_by(TOGETHER) {
+        let rows: Vec<usize> = (first..count.min(first + TOGETHER)).collect();
         let some = chosen.points.select_rows(&rows);
         let made;
         let at = if let Some(held) = responses {
@@ -201,12 +184,12 @@ fn pointwise_of(
             &made[..]
         };
         let left_out = |(i, response): (usize, &Vec<f64>)| {
-            p.likelihood.left_out(response, &some.row(i)[some.columns() - own..])
+            densities(response, &some.row(i)[some.columns() - own..])
         };
-        let densities: Option<Vec<_>> = at.par_iter().enumerate().map(left_out).collect();
-        for (row, density) in rows.iter().zip(densities?) {
-            let all = all.get_or_insert_with(|| Matrix::zeros(count, data.len()));
-            all.row_mut(*row).copy_from_slice(&density[data.clone()]);
+        let found: Option<Vec<_>> = at.par_iter().enumerate().map(left_out).collect();
+        for (row, density) in rows.iter().zip(found?) {
+            let all = all.get_or_insert_with(|| Matrix::zeros(count, density.len()));
+            all.row_mut(*row).copy_from_slice(&density);
         }
     }
     all

@@ -1,7 +1,7 @@
 //! Leave-one-out predictions compared with ArviZ and with exact predictions.
 
 use super::*;
-use crate::math::random::{Stream, normal};
+use crate::math::random::{Stream, normal, permutation};
 use crate::math::special::HALF_LN_TWO_PI;
 
 /// Log densities with heavy tails: the squared misfit of logistic quantiles in mixed order.
@@ -302,4 +302,70 @@ fn left_out_curves_of_correlated_values_have_their_exact_predictions() {
         assert!((left.elpd - exact).abs() < 0.03, "{c}: {} and {exact}", left.elpd);
     }
     assert!((found.elpd - total).abs() < 0.1 && found.unreliable == 0, "{} {total}", found.elpd);
+}
+
+/// A sample of all data gives the sums over all data.
+#[test]
+fn a_sample_of_everything_is_exact() {
+    let curve: Vec<usize> = (0..12).map(|i| i / 3).collect();
+    let all = LeaveOneOut::of(&densities(400, 12, 0.0, 0.5), 1.0, curve);
+    let mut about = Approximation::default();
+    all.data.iter().enumerate().for_each(|(i, left)| about.add(left.elpd, i % 3 == 0, true));
+    let found = LeaveOneOut::from_sample(all.data.clone(), &about, all.limit);
+    for (a, b) in [
+        (found.elpd, all.elpd),
+        (found.error, all.error),
+        (found.parameters, all.parameters),
+        (found.error_by_curve.unwrap(), all.error_by_curve.unwrap()),
+    ] {
+        assert!((a - b).abs() < 1e-9 * b.abs(), "{a} and {b}");
+    }
+    assert_eq!(found.sampled, Some(Sampled { of: 12, error: 0.0 }));
+}
+
+/// Samples of exact predictions: their estimates scatter about the sum as their standard errors say, whatever the
+/// approximation, and the better it is the less.
+#[test]
+fn samples_of_many_data_scatter_as_their_errors_say() {
+    let (all, size, repeats) = (3000, 200, 600);
+    let mut rng = Stream::root(6).generator();
+    let exact: Vec<f64> = (0..all).map(|_| -0.5 * normal(&mut rng).powi(2)).collect();
+    let truth: f64 = exact.iter().sum();
+    let mut errors = Vec::new();
+    for noise in [0.01, 1.0] {
+        let about: Vec<f64> = exact.iter().map(|e| e - 0.1 + noise * normal(&mut rng)).collect();
+        let (mut squares, mut stated) = (0.0, 0.0);
+        for _ in 0..repeats {
+            let mut chosen = permutation(&mut rng, all);
+            chosen.truncate(size);
+            chosen.sort_unstable();
+            let mut approximation = Approximation::default();
+            for (i, value) in about.iter().enumerate() {
+                approximation.add(*value, false, chosen.binary_search(&i).is_ok());
+            }
+            let left = |&i: &usize| Left { elpd: exact[i], with_it: exact[i], k_hat: 0.0 };
+            let sample = chosen.iter().map(left).collect();
+            let found = LeaveOneOut::from_sample(sample, &approximation, 0.7);
+            squares += (found.elpd - truth).powi(2) / f64::from(repeats);
+            stated += found.sampled.unwrap().error.powi(2) / f64::from(repeats);
+        }
+        // The mean square of `repeats` normal numbers has the relative standard deviation sqrt(2 / repeats).
+        let bound = 4.0 * (2.0 / f64::from(repeats)).sqrt();
+        assert!((squares / stated - 1.0).abs() < bound, "{squares} and {stated}");
+        errors.push(stated.sqrt());
+    }
+    assert!(errors[0] < 0.02 * errors[1]);
+}
+
+#[test]
+fn samples_of_the_same_data_are_compared() {
+    let of = |shift: f64, count: usize| {
+        let left = |i: usize| Left { elpd: (i as f64).sin() + shift, with_it: 0.0, k_hat: 0.0 };
+        let mut about = Approximation::default();
+        (0..count).for_each(|i| about.add((i as f64).sin() + shift, false, i < 50));
+        LeaveOneOut::from_sample((0..50).map(left).collect(), &about, 0.7)
+    };
+    let found = compare(&of(0.0, 1000), &of(-0.1, 1000)).unwrap();
+    assert!((found.elpd - 100.0).abs() < 1e-9 && found.error < 1e-9, "{found:?}");
+    assert!(compare(&of(0.0, 1000), &of(0.0, 900)).is_err());
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lacuna::diagnose::leave_one_out::{LeaveOneOut, Left};
+use lacuna::diagnose::leave_one_out::{LeaveOneOut, Left, Sampled};
 use lacuna::diagnose::pareto::LARGEST_K;
 use lacuna::plugin::sampler::Evidence;
 use lacuna::run::{Stop, files};
@@ -26,6 +26,10 @@ const LEFT_OUT: &str = "left_out.nc";
 /// Prefix of the names of the arrays by datum.
 const DATUM: &str = "";
 const CURVE: &str = "curve_";
+
+/// Array of the sums over all data if the data by datum are a sample: number of data, standard error by the sampling, `elpd`,
+/// its two standard errors (NaN without curves), and `p_loo`.
+const WHOLE: &str = "whole";
 
 /// Array of the probabilities of values below the measured ones.
 const BELOW: &str = "below";
@@ -89,6 +93,11 @@ fn columns(loo: &LeaveOneOut, prefix: &str, dimension: &str) -> Vec<Array<'stati
         column("k_hat", |left| left.k_hat),
         array("limit", "one", vec![loo.limit]),
     ];
+    if let Some(Sampled { of, error }) = loo.sampled {
+        let by_curve = loo.error_by_curve.unwrap_or(f64::NAN);
+        let sums = vec![of as f64, error, loo.elpd, loo.error, by_curve, loo.parameters];
+        columns.push(array(WHOLE, "sum", sums));
+    }
     if !loo.curve.is_empty() {
         columns.push(array("curve", dimension, loo.curve.iter().map(|&c| c as f64).collect()));
     }
@@ -113,11 +122,16 @@ fn read(path: &Path, prefix: &str) -> Result<LeaveOneOut, Stop> {
     // Runs of earlier versions have neither limit nor curves.
     let limit = column("limit").ok().and_then(|limit| limit.first().copied());
     let curve = column("curve").unwrap_or_default();
-    Ok(LeaveOneOut::sum(
+    let whole = column(WHOLE).unwrap_or_default();
+    let own = LeaveOneOut::sum(
         each.map(|((elpd, with_it), k_hat)| Left { elpd, with_it, k_hat }).collect(),
         limit.unwrap_or(LARGEST_K),
         curve.into_iter().map(|c| c as usize).collect(),
-    ))
+    );
+    let &[of, by_sampling, elpd, error, by_curve, parameters] = &whole[..] else { return Ok(own) };
+    let sampled = Some(Sampled { of: of as usize, error: by_sampling });
+    let error_by_curve = Some(by_curve).filter(|error| !error.is_nan());
+    Ok(LeaveOneOut { elpd, error, error_by_curve, parameters, sampled, ..own })
 }
 
 /// Reads the leave-one-out predictions of data that a run kept in the stage's folder.
