@@ -14,7 +14,7 @@ const FEWEST: usize = 5;
 /// computed from them.
 const ROUNDING: f64 = 0.01;
 /// Largest number of curves of a group that are compared with each other.
-const MOST: usize = 60;
+pub const MOST: usize = 60;
 /// Fractions of omitted curves that give a reservation and a failure.
 const SHARE: (f64, f64) = (0.1, 0.5);
 
@@ -70,7 +70,7 @@ pub fn rules() -> Vec<Rule> {
     ]
 }
 
-/// Curves of one group: name of the replicate and its values.
+/// Curves of one group: name of the replicate and its values. Those behind the first [`MOST`] are not read.
 pub type Curves<'a> = Vec<(&'a str, Vec<Option<f64>>)>;
 
 fn common(a: &[Option<f64>], b: &[Option<f64>]) -> Vec<(f64, f64)> {
@@ -81,8 +81,8 @@ fn vary(pairs: &[(f64, f64)]) -> bool {
     pairs.iter().any(|pair| pair.0 != pairs[0].0)
 }
 
-/// Finding about replicates of a group whose values equal those of an earlier one.
-pub fn duplicates(group: &str, curves: &Curves<'_>) -> Option<Finding> {
+/// Finding about replicates of a group, `all` of them, whose values equal those of an earlier one.
+pub fn duplicates(group: &str, curves: &Curves<'_>, all: usize) -> Option<Finding> {
     let same = |a: &[Option<f64>], b: &[Option<f64>]| {
         let pairs = common(a, b);
         pairs.len() >= FEWEST && vary(&pairs) && pairs.iter().all(|(x, y)| x == y)
@@ -94,12 +94,12 @@ pub fn duplicates(group: &str, curves: &Curves<'_>) -> Option<Finding> {
     if copies.is_empty() {
         return None;
     }
-    let half = 2 * copies.len() >= curves.len();
+    let half = 2 * copies.len() >= all;
     let severity = if half { Severity::Failure } else { Severity::Reservation };
     let message = format!(
         "{} of {} repeat the values of another: {}; they count as independent measurements",
         copies.len(),
-        count(curves.len(), "replicate"),
+        count(all, "replicate"),
         names(&copies)
     );
     Some(Finding::new((DUPLICATE, group), (copies.len() as f64, 0.0), severity, message, ONCE))

@@ -19,21 +19,25 @@ fn curves(values: &[Vec<f64>]) -> Curves<'static> {
     NAMES.into_iter().zip(values.iter().map(some)).collect()
 }
 
+fn duplicates(values: &[Vec<f64>]) -> Option<Finding> {
+    replicates::duplicates("A", &curves(values), values.len())
+}
+
 #[test]
 fn copies_and_means_among_replicates() {
     let mut sound = measured(1, 10);
-    assert_eq!(replicates::duplicates("A", &curves(&sound)), None);
+    assert_eq!(duplicates(&sound), None);
     assert_eq!(replicates::symmetric("A", &curves(&sound)), None);
     let copies = vec![sound[0].clone(); 10];
-    let found = replicates::duplicates("A", &curves(&copies));
+    let found = duplicates(&copies);
     has(found.as_ref(), "duplicate_replicates", Severity::Failure);
     assert_eq!(found.unwrap().figure, Some(9.0));
     sound[7] = sound[2].clone();
-    let found = replicates::duplicates("A", &curves(&sound));
+    let found = duplicates(&sound);
     has(found.as_ref(), "duplicate_replicates", Severity::Reservation);
     // The constant signal of a dead sensor is not a copy.
     let dead = vec![vec![0.0; 30]; 4];
-    assert_eq!(replicates::duplicates("A", &curves(&dead)), None);
+    assert_eq!(duplicates(&dead), None);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use lacuna::data::layout::Group;
 use lacuna::data::measurements::Summary;
-use lacuna::data::{Measurements, Observations};
+use lacuna::data::{Measurements, Observations, Replicate};
 use lacuna::math::moments::{self, mean};
 use lacuna_linalg::Matrix;
 
@@ -29,8 +29,11 @@ pub(super) fn findings(
     let mut found = Vec::new();
     for block in &measured.used.blocks {
         for group in block.layout.groups() {
-            let curves = curves(block, &group);
-            found.extend(replicates::duplicates(&group.name, &curves));
+            let own: Vec<&Replicate> = curves(block, &group).collect();
+            let values = |r: &&'_ Replicate| group.indices.iter().map(|&i| r.values[i]).collect();
+            let first = own.iter().take(replicates::MOST);
+            let curves: Curves<'_> = first.map(|r| (r.name.as_str(), values(r))).collect();
+            found.extend(replicates::duplicates(&group.name, &curves, own.len()));
             found.extend(replicates::symmetric(&group.name, &curves));
         }
     }
@@ -45,18 +48,15 @@ pub(super) fn findings(
 }
 
 /// Replicates that have values in a group.
-fn curves<'a>(block: &'a Measurements, group: &Group) -> Curves<'a> {
-    let values = |r: &'a lacuna::data::Replicate| {
-        (r.name.as_str(), group.indices.iter().map(|&i| r.values[i]).collect::<Vec<_>>())
-    };
-    let all = block.replicates.iter().map(values);
-    all.filter(|(_, values)| values.iter().any(Option::is_some)).collect()
+fn curves<'a>(block: &'a Measurements, group: &'a Group) -> impl Iterator<Item = &'a Replicate> {
+    let is_there = move |r: &&Replicate| group.indices.iter().any(|&i| r.values[i].is_some());
+    block.replicates.iter().filter(is_there)
 }
 
 fn dropped(measured: &Measured) -> Option<Finding> {
     let left_out = measured.flagged.iter().filter(|curve| curve.left_out).count();
     let of = |block: &Measurements| -> usize {
-        block.layout.groups().iter().map(|group| curves(block, group).len()).sum()
+        block.layout.groups().iter().map(|group| curves(block, group).count()).sum()
     };
     replicates::left_out(left_out, measured.read.blocks.iter().map(of).sum())
 }

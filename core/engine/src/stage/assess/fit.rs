@@ -1,12 +1,12 @@
 //! Checks of the calibrated model against the data.
 
+use lacuna::data::Observations;
 use lacuna::data::measurements::Summary;
-use lacuna::data::{Coordinates, Measurements, Observations};
 use lacuna::math::moments::mean;
 use lacuna::math::random::Stream;
 use rayon::prelude::*;
 
-use super::{Judged, some};
+use super::{Judged, series, some};
 use crate::assess::fit::{self as check, Against};
 use crate::assess::{Finding, residuals};
 use crate::stage::artifacts::Artifacts;
@@ -20,8 +20,10 @@ const SIMULATED: usize = 100;
 const CORRELATED: usize = 40;
 /// Number of replicates from which on a 95 % interval is meaningful.
 const REPLICATES: usize = 3;
-/// Length below which a curve's autocorrelation cannot be estimated.
-const SHORT: usize = 10;
+/// Number of data above which those of simulated data that need only counts, means and scatters are drawn without the data,
+/// if the data are more than this number of times as many as the outputs.
+const MANY: usize = 1_000_000;
+const MANY_TIMES: usize = 100;
 
 pub(super) fn findings(judged: &Judged<'_>, all: &Artifacts<'_>) -> Vec<Finding> {
     let mut found = simulated(judged);
@@ -114,30 +116,41 @@ fn simulated(judged: &Judged<'_>) -> Vec<Finding> {
     let random = stream(judged.study, "assess").named("simulate");
     let variance = judged.variance();
     let look = Look { judged, variance: &variance };
-    let one = |i: usize| {
-        let response = &responses[i];
-        let random: Stream = random.at(i as u64);
-        let data = judged.predictive.simulate(response, judged.hyper(points.row(i)), &random);
-        let data = Observations { blocks: data };
-        let time = (i < CORRELATED).then(|| look.time(&data, response)).flatten();
-        (look.misfit(&data, response), time, look.against_scatter(&data, response))
-    };
-    let made: Vec<(f64, Option<f64>, f64)> = (0..count).into_par_iter().map(one).collect();
-    let data = &judged.measured.likelihood;
-    let misfits: Vec<f64> = made.iter().map(|m| m.0).filter(|m| m.is_finite()).collect();
-    let times: Vec<f64> = made.iter().filter_map(|m| m.1).collect();
-    let ratios: Vec<f64> = made.iter().map(|m| m.2).filter(|f| f.is_finite()).collect();
     // With the error of the replicates' mean, the correlation within a replicate is in the covariance of the mean
     // curve.
     let allowed = judged.study.discrepancy.as_ref().is_some_and(|d| d.common.replicate_error);
     let replicated = judged.measured.used.blocks.iter().all(|b| b.replicates.len() >= REPLICATES);
-    let time = look.time(data, &judged.response).filter(|_| !(allowed && replicated));
+    let correlated = !(allowed && replicated);
+    let data = &judged.measured.likelihood;
+    let values = data.count();
+    let many = values > MANY && values > MANY_TIMES * outputs;
+    let one = |i: usize| {
+        let (response, hyper) = (&responses[i], judged.hyper(points.row(i)));
+        let random: Stream = random.at(i as u64);
+        let timed = correlated && i < CORRELATED;
+        let summaries = (many && !timed)
+            .then(|| judged.predictive.simulate_summaries(response, hyper, &random))
+            .flatten();
+        if let Some(summaries) = summaries {
+            let all = summaries.concat();
+            return (look.misfit(&all, response), None, look.against_scatter(&all, response));
+        }
+        let data = Observations { blocks: judged.predictive.simulate(response, hyper, &random) };
+        let time = timed.then(|| look.time(&data, response)).flatten();
+        let all = data.summaries();
+        (look.misfit(&all, response), time, look.against_scatter(&all, response))
+    };
+    let made: Vec<(f64, Option<f64>, f64)> = (0..count).into_par_iter().map(one).collect();
+    let misfits: Vec<f64> = made.iter().map(|m| m.0).filter(|m| m.is_finite()).collect();
+    let times: Vec<f64> = made.iter().filter_map(|m| m.1).collect();
+    let ratios: Vec<f64> = made.iter().map(|m| m.2).filter(|f| f.is_finite()).collect();
+    let time = correlated.then(|| look.time(data, &judged.response)).flatten();
     let used = &judged.measured.used;
     let (effective, replicates) = look.independent(used);
     some([
-        check::misfit(look.misfit(data, &judged.response), &misfits),
+        check::misfit(look.misfit(&data.summaries(), &judged.response), &misfits),
         check::scatter(
-            look.against_scatter(used, &judged.response),
+            look.against_scatter(&used.summaries(), &judged.response),
             &ratios,
             effective,
             replicates,
@@ -155,8 +168,7 @@ struct Look<'a> {
 
 impl Look<'_> {
     /// Mean square of the difference between the replicates' mean and the response, in units of its standard error.
-    fn misfit(&self, data: &Observations, response: &[f64]) -> f64 {
-        let summaries = data.summaries();
+    fn misfit(&self, summaries: &[Summary], response: &[f64]) -> f64 {
         let each = summaries.iter().zip(response).zip(self.variance);
         let term =
             |((s, r), v): ((&Summary, &f64), &f64)| s.count as f64 * (s.mean - r).powi(2) / v;
@@ -167,8 +179,7 @@ impl Look<'_> {
 
     /// Mean square of the difference between the replicates' mean and the response, divided by its variance according
     /// to the replicates' scatter; NaN without replicates.
-    fn against_scatter(&self, data: &Observations, response: &[f64]) -> f64 {
-        let summaries = data.summaries();
+    fn against_scatter(&self, summaries: &[Summary], response: &[f64]) -> f64 {
         let each = summaries.iter().zip(response).zip(self.variance);
         let (mut above, mut below, mut count) = (0.0, 0.0, 0.0);
         for ((s, r), v) in each.filter(|((s, _), v)| s.count >= REPLICATES && **v > 0.0) {
@@ -194,65 +205,13 @@ impl Look<'_> {
 
     /// Autocorrelation time of residuals along the last axis, in steps, over all curves together and about zero.
     fn time(&self, data: &Observations, response: &[f64]) -> Option<f64> {
-        let ranges = self.judged.study.layouts.ranges();
-        let series: Vec<Vec<f64>> = data
-            .blocks
-            .iter()
-            .zip(ranges)
-            .flat_map(|(block, range)| {
-                curves(block, &response[range.clone()], &self.variance[range])
-            })
-            .collect();
-        integrated(&series)
+        let ranges: Vec<_> = self.judged.study.layouts.ranges().collect();
+        series::time(|each| {
+            for (block, range) in data.blocks.iter().zip(&ranges) {
+                let (response, variance) =
+                    (&response[range.clone()], &self.variance[range.clone()]);
+                series::of(block, response, variance, each);
+            }
+        })
     }
-}
-
-/// Residuals of each contiguous stretch of a curve, in standard deviations.
-fn curves(block: &Measurements, response: &[f64], variance: &[f64]) -> Vec<Vec<f64>> {
-    let Some(last) = block.layout.axes.last() else { return Vec::new() };
-    if !matches!(last.coordinates, Coordinates::Grid { .. }) || last.len() < SHORT {
-        return Vec::new();
-    }
-    let mut series = Vec::new();
-    for replicate in &block.replicates {
-        let all: Vec<Option<f64>> = replicate
-            .values
-            .iter()
-            .zip(response)
-            .zip(variance)
-            .map(|((y, r), v)| y.filter(|_| *v > 0.0).map(|y| (y - r) / v.sqrt()))
-            .collect();
-        for curve in all.chunks(last.len()) {
-            let stretches = curve.split(Option::is_none);
-            let long = stretches.filter(|stretch| stretch.len() >= SHORT);
-            series.extend(long.map(|stretch| stretch.iter().flatten().copied().collect()));
-        }
-    }
-    series
-}
-
-/// Integrated autocorrelation time of series about zero, summed over Sokal's window.
-fn integrated(series: &[Vec<f64>]) -> Option<f64> {
-    const WINDOW: f64 = 5.0;
-    let longest = series.iter().map(Vec::len).max()?;
-    let lagged = |lag: usize| {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for curve in series.iter().filter(|curve| curve.len() > lag) {
-            sum += lacuna_linalg::vector::dot(&curve[..curve.len() - lag], &curve[lag..]);
-            count += (curve.len() - lag) as f64;
-        }
-        if count > 0.0 { sum / count } else { 0.0 }
-    };
-    let power = lagged(0);
-    if power <= 0.0 || !power.is_finite() {
-        return None;
-    }
-    let mut time = 1.0;
-    for lag in 1..longest {
-        time += 2.0 * lagged(lag) / power;
-        if lag as f64 >= WINDOW * time {
-            break;
-        }
-    }
-    Some(time.max(0.1))
 }

@@ -9,6 +9,7 @@ mod fit;
 mod intervals;
 mod posterior;
 mod runs;
+mod series;
 
 use std::path::Path;
 
