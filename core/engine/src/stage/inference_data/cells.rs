@@ -22,13 +22,22 @@ pub struct Place {
     /// Names of coordinates that are not dimensions.
     coordinates: String,
     /// Dimensions of each block: the replicates and the axes.
-    pub blocks: Vec<Vec<DimensionId>>,
+    blocks: Vec<Vec<DimensionId>>,
 }
+
+/// Largest number of data that are written: 80 MB.
+const MOST: usize = 10_000_000;
 
 /// Index of an axis in a layout, its values and their unit.
 type Grid<'a> = (usize, &'a [f64], String);
 
 impl Place {
+    /// Dimensions of the axes of each block.
+    pub fn axes(&self) -> Vec<Vec<DimensionId>> {
+        // The first dimension is that of the replicates.
+        self.blocks.iter().map(|block| block[1..].to_vec()).collect()
+    }
+
     /// A variable on these dimensions, which follow `others`.
     pub fn variable(
         &self,
@@ -53,6 +62,20 @@ impl<'a> Cells<'a> {
         let block = |b: &Measurements| b.replicates.len() * b.layout.len();
         let complete = data.blocks.len() == 1 && data.count() == block(&data.blocks[0]);
         Self { data, complete }
+    }
+
+    /// Returns true if the data are too many to be written.
+    pub fn are_many(&self) -> bool {
+        self.data.count() > MOST
+    }
+
+    /// Writes the axes of each block into a group.
+    pub fn axes(&self, file: &mut File, group: &str) -> Result<Vec<Vec<DimensionId>>, Error> {
+        let blocks = self.data.blocks.iter().enumerate();
+        let of = |(b, block): (usize, &Measurements)| {
+            file.axes(group, &block.layout, &suffix(b, self.data.blocks.len()))
+        };
+        blocks.map(of).collect()
     }
 
     /// All measured values, concatenated.

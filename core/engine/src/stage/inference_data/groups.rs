@@ -4,7 +4,7 @@ use lacuna::data::{Condition, Observations, Scenario};
 use lacuna_linalg::Matrix;
 use netcdf_writer::{DimensionId, Error, NcAttrValue};
 
-use super::cells::{Cells, Place};
+use super::cells::Cells;
 use super::file::File;
 use super::predicted::{FromPosterior, FromPrior};
 use super::suffix;
@@ -33,6 +33,10 @@ pub struct Given<'a> {
 const TOO_MANY: &str = "log_likelihood and posterior_predictive are omitted: even the smallest useful number of \
                         draws gives more than ten million values";
 
+/// Reason why the data are missing.
+const MANY: &str =
+    "observed_data is omitted: there are more than ten million data; they are in the folder 3-read";
+
 impl Given<'_> {
     /// Bytes of the file. The largest tables are given up as soon as they are in the file under construction.
     pub fn encode(mut self) -> Result<Vec<u8>, Error> {
@@ -44,6 +48,9 @@ impl Given<'_> {
         ];
         if self.data.is_some() && self.from_posterior.is_none() {
             attributes.push(("note", TOO_MANY));
+        }
+        if self.data.is_some_and(|data| Cells::of(data).are_many()) {
+            attributes.push(("note_on_data", MANY));
         }
         let mut file = File::new(&attributes)?;
         self.posterior(&mut file)?;
@@ -58,7 +65,7 @@ impl Given<'_> {
         }
         self.constants(&mut file)?;
         let mut groups = vec!["posterior", "sample_stats", "prior"];
-        if self.data.is_some() {
+        if self.data.is_some_and(|data| !Cells::of(data).are_many()) {
             groups.push("observed_data");
         }
         for group in groups {
@@ -142,6 +149,11 @@ impl Given<'_> {
         let layouts = &self.study.layouts;
         let (name, unit) = (layouts.name(), layouts.unit().to_string());
         let unit = Some(unit.as_str());
+        if cells.are_many() {
+            let axes = cells.axes(file, PREDICTIVE)?;
+            self.band(file, &axes)?;
+            return Ok(None);
+        }
         let place = cells.place(file, "observed_data")?;
         place.variable(file, &format!("observed_data/{name}"), &[], &cells.values(), unit)?;
         if let Some(from) = &mut self.from_posterior {
@@ -153,7 +165,7 @@ impl Given<'_> {
             place.variable(file, &path, &draws, data.as_slice(), unit)?;
             drop(data);
             let densities = from.log_likelihood.take();
-            self.band(file, &place)?;
+            self.band(file, &place.axes())?;
             if let (Some(densities), Some(from)) = (densities, &self.from_posterior) {
                 let place = cells.place(file, "log_likelihood")?;
                 let draws = chosen(file, "log_likelihood", from)?;
@@ -168,7 +180,7 @@ impl Given<'_> {
             }
         } else {
             let place = cells.place(file, PREDICTIVE)?;
-            self.band(file, &place)?;
+            self.band(file, &place.axes())?;
         }
         if let Some((numbers, data)) = self.from_prior.data.take() {
             let group = "prior_predictive";
@@ -182,19 +194,17 @@ impl Given<'_> {
     }
 
     /// Writes the band of a new replicate.
-    fn band(&self, file: &mut File, place: &Place) -> Result<(), Error> {
+    fn band(&self, file: &mut File, axes: &[Vec<DimensionId>]) -> Result<(), Error> {
         let Some((low, high)) = self.validated.and_then(|v| v.predictive.as_ref()) else {
             return Ok(());
         };
         let layouts = &self.study.layouts;
         let unit = layouts.unit().to_string();
         for (i, (layout, range)) in layouts.parts().enumerate() {
-            // The first dimension is that of the replicates; the axes follow.
-            let axes = &place.blocks[i][1..];
             let block = suffix(i, layouts.blocks.len());
             for (end, values) in [("q025", low), ("q975", high)] {
                 let path = format!("{PREDICTIVE}/{}_{end}{block}", layout.name);
-                file.numbers(&path, axes, &values[range.clone()], Some(&unit))?;
+                file.numbers(&path, &axes[i], &values[range.clone()], Some(&unit))?;
             }
         }
         Ok(())
