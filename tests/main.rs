@@ -36,6 +36,8 @@ mod hierarchy;
 mod intervals;
 mod kill;
 mod left_out;
+#[cfg(target_os = "linux")]
+mod long_tables;
 mod made_by;
 mod predict;
 mod priors;

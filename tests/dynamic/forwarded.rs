@@ -240,7 +240,7 @@ fn noise_that_files_state_is_read_the_same() {
 }
 
 fn data_without_noise(data: &Measurements) -> Measurements {
-    let bare = |r: &Replicate| Replicate::new(r.name.clone(), r.values.clone());
+    let bare = |r: &Replicate| Replicate::new(r.name.clone(), r.values.to_vec());
     Measurements::new(data.layout.clone(), data.replicates.iter().map(bare).collect())
 }
 
