@@ -121,6 +121,19 @@ pub fn quantile(sorted: &[f64], p: f64) -> f64 {
     sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
 }
 
+/// Like [`quantile`], of a sample in any order, which is reordered: faster than sorting for few quantiles.
+pub fn quantile_of(values: &mut [f64], p: f64) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    let place = p.clamp(0.0, 1.0) * (values.len() - 1) as f64;
+    let below = place.floor() as usize;
+    let (_, low, greater) = values.select_nth_unstable_by(below, f64::total_cmp);
+    let low = *low;
+    let high = greater.iter().copied().min_by(f64::total_cmp).unwrap_or(low);
+    low + (place - below as f64) * (high - low)
+}
+
 /// Histogram with bins of equal width.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Histogram {
@@ -257,6 +270,22 @@ mod tests {
     use crate::math::random::Stream;
 
     const SAMPLE: [f64; 12] = [0.9, 2.1, 0.3, 1.7, 5.2, 0.8, 1.1, 3.3, 2.4, 0.6, 1.5, 7.9];
+
+    #[test]
+    fn a_quantile_without_sorting_is_that_of_the_sorted_sample() {
+        let mut rng = crate::math::random::Stream::root(9).generator();
+        for count in [0, 1, 2, 7, 1000] {
+            // Rounded, so that values are equal.
+            let values: Vec<f64> = (0..count)
+                .map(|_| (10.0 * crate::math::random::normal(&mut rng)).round())
+                .collect();
+            for p in [0.0, 0.025, 0.5, 0.975, 1.0] {
+                let (expected, found) =
+                    (quantile(&sorted(&values), p), quantile_of(&mut values.clone(), p));
+                assert_eq!(found.to_bits(), expected.to_bits(), "{count} {p}");
+            }
+        }
+    }
 
     #[test]
     fn quantiles_are_those_of_numpy() {

@@ -293,7 +293,7 @@ impl Work<'_> {
         let count = predict::affordable(wanted, outputs);
         let chosen = draws.points().select_rows(&predict::spaced(count, draws.len()));
         let responses = predict::responses(self.study, self.forward, &chosen);
-        let own = likelihood.hyperparameters().len();
+        let d = chosen.columns() - likelihood.hyperparameters().len();
         let several = wanted.div_ceil(count);
         let mut noises: Vec<_> =
             (0..count * several).map(|i| random.at(i as u64).generator()).collect();
@@ -303,9 +303,8 @@ impl Work<'_> {
         let outputs: Vec<usize> = (0..outputs).collect();
         for part in outputs.chunks(outputs.len().div_ceil(parts).max(1)) {
             let of_draw = |i: usize| -> Vec<f64> {
-                let point = chosen.row(i);
-                let variance = likelihood.predictive(&responses[i], &point[point.len() - own..]);
-                let variance = total(&variance);
+                let hyper = &chosen.row(i)[d..];
+                let variance = total(&likelihood.predictive(&responses[i], hyper));
                 part.iter().map(|&j| variance.get(j).map_or(0.0, |v| v.sqrt())).collect()
             };
             let sds: Vec<Vec<f64>> = (0..count).into_par_iter().map(of_draw).collect();
@@ -319,8 +318,8 @@ impl Work<'_> {
                 })
                 .collect();
             let ends = |j: usize| {
-                let sorted = moments::sorted(&simulated.iter().map(|r| r[j]).collect::<Vec<_>>());
-                [0.025, 0.975].map(|p| moments::quantile(&sorted, p))
+                let mut values: Vec<f64> = simulated.iter().map(|r| r[j]).collect();
+                [0.025, 0.975].map(|p| moments::quantile_of(&mut values, p))
             };
             let ends: Vec<[f64; 2]> = (0..part.len()).into_par_iter().map(ends).collect();
             band.0.extend(ends.iter().map(|end| end[0]));
