@@ -1,3 +1,4 @@
 //! Coverage of printed uncertainties: `lacuna coverage`, and the gate.
 
+mod elsewhere;
 pub mod verb;

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use lacuna::plugin::Model;
 use lacuna_contract::Line;
-use lacuna_engine::host::library;
+use lacuna_engine::work::with_model;
 use lacuna_run::work::{Assignment, Limits, work};
 // The other models.
 use lacuna_plugins as _;
@@ -26,7 +26,7 @@ fn main() -> ExitCode {
         parallel: after("--parallel").unwrap_or(1),
         limits: Limits::default(),
     };
-    match work(&assignment, &library::load, &mut std::io::stdin().lock(), &mut std::io::stdout()) {
+    match work(&assignment, &with_model, &mut std::io::stdin().lock(), &mut std::io::stdout()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(stop) => {
             eprintln!("{stop}");

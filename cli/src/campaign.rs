@@ -6,6 +6,7 @@ use lacuna::plugin::Reader;
 use lacuna::plugin::registry::from_text;
 use lacuna::run::Stop;
 use lacuna_engine::campaign;
+use lacuna_engine::study::Study;
 use lacuna_engine::study::resolve::Use;
 use lacuna_run::RunDirectory;
 
@@ -73,9 +74,17 @@ pub fn campaign(what: &Campaign) -> anyhow::Result<()> {
     }
 }
 
+/// The study of a run directory; `None` if only cases of one were computed there, as by `lacuna coverage`.
+fn study_of(folder: &Path) -> anyhow::Result<Option<Study>> {
+    if !folder.join("resolved.toml").exists() && campaign::has_runs(folder) {
+        return Ok(None);
+    }
+    kept_study_for(folder, Use::Look).map(Some)
+}
+
 fn status(folder: &Path, all: bool, json: bool) -> anyhow::Result<()> {
-    let study = kept_study_for(folder, Use::Look)?;
-    let status = campaign::status(&study, folder, RunDirectory::is_busy(folder))?;
+    let study = study_of(folder)?;
+    let status = campaign::status(study.as_ref(), folder, RunDirectory::is_busy(folder))?;
     if json {
         let text = serde_json::to_string_pretty(&status)
             .map_err(|error| Stop::new(format!("the table cannot be written: {error}")))?;
@@ -102,9 +111,8 @@ fn retry(folder: &Path) -> anyhow::Result<()> {
 }
 
 fn cancel(folder: &Path) -> anyhow::Result<()> {
-    let study = kept_study_for(folder, Use::Look)?;
-    let executor = study.executor.as_ref().ok_or_else(|| Stop::new("the study has no executor"))?;
-    let stopped = campaign::cancel(folder, &*executor.built.plugin)?;
+    let study = study_of(folder)?;
+    let stopped = campaign::cancel(study.as_ref(), folder)?;
     if stopped == 0 {
         print("no job of this campaign is running or queued");
         return Ok(());
@@ -112,7 +120,10 @@ fn cancel(folder: &Path) -> anyhow::Result<()> {
     let help = if RunDirectory::is_busy(folder) {
         "the waiting process will report them as cancelled".to_owned()
     } else {
-        format!("`lacuna resume {}` submits them again", folder.display())
+        match study {
+            Some(_) => format!("`lacuna resume {}` submits runs again", folder.display()),
+            None => "the command that asked for them submits them again".to_owned(),
+        }
     };
     print(&format!("{stopped} runs cancelled; {help}"));
     Ok(())

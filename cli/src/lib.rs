@@ -83,7 +83,7 @@ enum Verb {
         trust: study::Trust,
     },
     /// Estimate the power of `lacuna gap`: plant every effect in a study's own noise and count what is found, how
-    /// small, and how often wrongly
+    /// small, and how often wrongly; `[cases]` in the study says where, if not in threads of this process
     Power {
         /// Study file
         study: PathBuf,
@@ -110,7 +110,8 @@ enum Verb {
         #[arg(long, value_enum)]
         by: Option<gap::By>,
     },
-    /// Count how often a study's intervals contain the truth, by calibrating data generated at truths from the prior
+    /// Count how often a study's intervals contain the truth, by calibrating data generated at truths from the prior;
+    /// `[cases]` in the study says where, if not in threads of this process
     Coverage {
         /// Study file
         study: PathBuf,
@@ -217,7 +218,7 @@ enum Verb {
         #[command(subcommand)]
         what: campaign::Campaign,
     },
-    /// Make runs of an order; executors start this in other processes and on other machines
+    /// Make runs or cases of an order; executors start this in other processes and on other machines
     #[command(hide = true)]
     Work(work::Work),
     /// Write the skeleton of a study or a plugin

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use lacuna_engine::host::library;
+use lacuna_engine::work::with_model;
 use lacuna_run::work::{Assignment, Limits, work};
 
 /// Assignment of a worker.
@@ -37,5 +37,5 @@ pub fn run(asked: &Work) -> anyhow::Result<()> {
         parallel: asked.parallel.get(),
         limits: Limits { part: asked.part, memory: asked.memory },
     };
-    Ok(work(&assignment, &library::load, &mut std::io::stdin().lock(), &mut std::io::stdout())?)
+    Ok(work(&assignment, &with_model, &mut std::io::stdin().lock(), &mut std::io::stdout())?)
 }

@@ -6,7 +6,7 @@ mod jobs;
 mod moved;
 mod nodes;
 mod processes;
-mod queue;
+pub mod queue;
 mod trouble;
 mod verbs;
 

@@ -54,6 +54,26 @@ fn a_model_of_a_library_gives_the_same_bits_on_a_cluster() {
     assert_eq!(quick::results(&there), quick::results(&here));
 }
 
+/// The processes of cases load the library too, and the posterior of the run is found again.
+#[test]
+fn cases_of_a_study_with_a_library_are_the_same_in_other_processes() {
+    let (folder, path) = study();
+    let [here, there] = ["here", "there"].map(|name| folder.path().join(name));
+    let (code, text) = quick::said(&mut run(&path, &here, "use = \"local\""));
+    assert_eq!(code, Some(0), "{text}");
+    let count = |out: &Path, settings: &[&str]| {
+        let mut command = quick::command();
+        command.args(["coverage", "--count", "3", "--out"]).arg(out).arg(&path).args(settings);
+        let (code, text) = quick::said(&mut command);
+        assert_eq!(code, Some(0), "{text}");
+        std::fs::read_to_string(out.join("7-coverage/cases.json")).unwrap()
+    };
+    let cases = count(&here, &[]);
+    assert!(!here.join(".kept").exists(), "no stage was made from other inputs");
+    let processes = "cases={ use = \"local\", processes = 2 }";
+    assert_eq!(count(&there, &["--set", processes]), cases);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_library_that_was_exchanged_meanwhile_is_refused_by_the_worker() {

@@ -7,6 +7,7 @@
 pub mod assess;
 pub mod augment;
 pub mod campaign;
+pub mod cases;
 pub mod compare;
 pub mod coverage;
 pub mod extremes;
@@ -22,3 +23,4 @@ pub mod serve;
 pub mod stage;
 pub mod study;
 pub mod view;
+pub mod work;

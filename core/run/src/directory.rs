@@ -89,7 +89,8 @@ pub struct RunDirectory {
     pub(super) as_recorded: bool,
     /// Hashes of the files of plugins that the study loads.
     pub(super) libraries: Vec<String>,
-    _lock: File,
+    /// Lock against other processes; `None` if the folder is only visited.
+    pub(super) lock: Option<File>,
 }
 
 /// Takes the lock; waits briefly for a process that is about to release it.
@@ -129,7 +130,11 @@ impl RunDirectory {
                 Stop::new(message).help("wait for it, or choose another folder with `--out DIR`")
             );
         }
-        Ok(Self {
+        Ok(Self::with(root, Some(lock)))
+    }
+
+    pub(super) fn with(root: &Path, lock: Option<File>) -> Self {
+        Self {
             root: root.to_owned(),
             records: Vec::new(),
             watched: Vec::new(),
@@ -138,8 +143,8 @@ impl RunDirectory {
             looking: false,
             as_recorded: false,
             libraries: Vec::new(),
-            _lock: lock,
-        })
+            lock,
+        }
     }
 
     /// Returns true if a process is working in the folder.
@@ -212,6 +217,9 @@ impl RunDirectory {
             Asked::of(stage, inputs, &self.version, &self.libraries)?;
         let folder = self.stage_folder(stage);
         let inputs = self.looked_at(stage, &alone).unwrap_or(inputs);
+        if self.is_visited() {
+            return self.visited(stage, &inputs);
+        }
         let before = self.made_otherwise(stage, &alone, &inputs, &made_by);
         self.bring_folder(stage, &inputs)?;
         match finished(&folder, &inputs) {
@@ -297,7 +305,7 @@ impl RunDirectory {
         }
     }
 
-    fn kept<T>(&mut self, record: Record, value: T, fresh: bool) -> Kept<T> {
+    pub(super) fn kept<T>(&mut self, record: Record, value: T, fresh: bool) -> Kept<T> {
         let kept = Kept { value, hash: record.hash(), seconds: record.seconds, fresh };
         self.records.push(record);
         kept

@@ -21,6 +21,9 @@ impl RunDirectory {
         inputs: &impl Serialize,
         smaller: &[impl Serialize],
     ) -> Result<(), Stop> {
+        if self.is_visited() {
+            return Ok(());
+        }
         let inputs = self.hash_of(stage, inputs)?;
         let folder = self.stage_folder(stage);
         let marked = fs::read_to_string(folder.join(INPUTS)).unwrap_or_default();

@@ -13,6 +13,7 @@ pub mod seen;
 pub mod stage;
 #[cfg(test)]
 mod testing;
+mod visit;
 pub mod work;
 
 pub use arrays::write_response;

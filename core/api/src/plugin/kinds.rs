@@ -8,7 +8,7 @@ use super::{
 crate::kind!(Reader, "reader", ["simulations", "measurements"]);
 crate::kind!(Design, "design", ["design"]);
 crate::kind!(Model, "model", ["model"]);
-crate::kind!(Executor, "executor", ["executor"]);
+crate::kind!(Executor, "executor", ["executor", "cases"]);
 crate::kind!(Surrogate, "surrogate", ["surrogate"]);
 crate::kind!(Discrepancy, "discrepancy", ["discrepancy"]);
 crate::kind!(Sampler, "sampler", ["sampler"]);

@@ -16,7 +16,7 @@ use crate::study::Study;
 pub use grow::{Grown, extend};
 pub use import::{Imports, import};
 pub use show::text;
-pub use status::{Row, State, Status, cancel, status, status_on_disk};
+pub use status::{Row, State, Status, cancel, has_runs, status, status_on_disk};
 
 /// Makes missing runs and repeats failed ones, and nothing else; returns the number of failed runs.
 pub fn retry(

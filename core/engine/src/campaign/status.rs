@@ -74,22 +74,42 @@ impl State {
     }
 }
 
-/// Status of the run directory of a study; `busy` is true if a process works in it.
-pub fn status(study: &Study, root: &Path, busy: bool) -> Result<Status, Stop> {
-    let executor = study.executor.as_ref().map(|section| &*section.built.plugin);
-    gathered(root, executor, &|| design::run_names(study.trained()), busy)
+/// Status of a run directory; `busy` is true if a process works in it. A directory in which no study was run, only cases of
+/// one were counted, has none.
+pub fn status(study: Option<&Study>, root: &Path, busy: bool) -> Result<Status, Stop> {
+    let look = |roll: &Roll, folder: &Path| {
+        with_executor(roll, study, |executor| executor.look(folder))
+            .unwrap_or_else(|| Ok(Vec::new()))
+    };
+    let names = || study.map_or(Ok(Vec::new()), |study| design::run_names(study.trained()));
+    gathered(root, &look, &names, busy)
+}
+
+/// Calls the executor of the runs of a stage: its own, or that of the study; `None` if there is none.
+fn with_executor<T>(
+    roll: &Roll,
+    study: Option<&Study>,
+    act: impl FnOnce(&dyn Executor) -> Result<T, Stop>,
+) -> Option<Result<T, Stop>> {
+    match &roll.executor {
+        Some(own) => Some(own.build().and_then(|executor| act(&*executor))),
+        None => study?.executor.as_ref().map(|section| act(&*section.built.plugin)),
+    }
 }
 
 /// Like [`status`], from the files of the run directory alone: no scheduler is asked, and runs that were added to the design
 /// appear when they are requested.
 pub fn status_on_disk(root: &Path, busy: bool) -> Result<Status, Stop> {
-    gathered(root, None, &|| Ok(Vec::new()), busy)
+    gathered(root, &|_, _| Ok(Vec::new()), &|| Ok(Vec::new()), busy)
 }
+
+/// Finds the jobs of the runs in a folder that run or are queued elsewhere.
+type Look<'a> = dyn Fn(&Roll, &Path) -> Result<Vec<Seen>, Stop> + 'a;
 
 /// Status of a run directory; `names` returns the names of all runs of the design.
 fn gathered(
     root: &Path,
-    executor: Option<&dyn Executor>,
+    look: &Look<'_>,
     names: &dyn Fn() -> Result<Vec<String>, Stop>,
     busy: bool,
 ) -> Result<Status, Stop> {
@@ -100,8 +120,7 @@ fn gathered(
         added.retain(|name| !roll.runs.contains(name));
         for (scenario, own) in &roll.scenarios {
             let folder = if own.as_os_str().is_empty() { folder.clone() } else { folder.join(own) };
-            let seen = executor.map_or(Ok(Vec::new()), |executor| executor.look(&folder));
-            let seen = seen.unwrap_or_else(|stop| {
+            let seen = look(&roll, &folder).unwrap_or_else(|stop| {
                 status.warnings.push(stop.message);
                 Vec::new()
             });
@@ -131,14 +150,21 @@ fn gathered(
 }
 
 /// Cancels jobs that run or are queued elsewhere; returns the number of runs that this stops.
-pub fn cancel(root: &Path, executor: &dyn Executor) -> Result<usize, Stop> {
+pub fn cancel(study: Option<&Study>, root: &Path) -> Result<usize, Stop> {
     let mut stopped = 0;
     for (_, folder, roll) in stages(root)? {
         for (_, own) in &roll.scenarios {
-            stopped += executor.cancel(&folder.join(own))?;
+            let folder = folder.join(own);
+            let ended = with_executor(&roll, study, |executor| executor.cancel(&folder));
+            stopped += ended.unwrap_or(Ok(0))?;
         }
     }
     Ok(stopped)
+}
+
+/// Returns true if the run directory has stages that make runs.
+pub fn has_runs(root: &Path) -> bool {
+    stages(root).is_ok_and(|stages| !stages.is_empty())
 }
 
 /// Stages that make runs, by name.

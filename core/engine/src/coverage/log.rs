@@ -6,10 +6,10 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use lacuna::diagnose::coverage::Ended;
 use lacuna::run::{Stop, files};
 
 use super::Tried;
+use crate::cases::Outcome;
 
 const FILE: &str = "cases.jsonl";
 
@@ -20,8 +20,8 @@ pub struct Log {
 }
 
 impl Log {
-    /// Opens the log of a folder with its cases. An incomplete last line is ignored, and a calibration that stopped is
-    /// repeated.
+    /// Opens the log of a folder with its cases. An incomplete last line is ignored, and a case that is
+    /// not settled is repeated.
     pub fn open(folder: &Path) -> Result<Self, Stop> {
         let path = folder.join(FILE);
         let text = if path.exists() {
@@ -30,7 +30,7 @@ impl Log {
             String::new()
         };
         let cases = text.lines().filter_map(|line| serde_json::from_str::<Tried>(line).ok());
-        let done = cases.filter(|tried| !matches!(tried.case.ended, Ended::Failed(_)));
+        let done = cases.filter(Outcome::is_settled);
         let done = done.map(|tried| (tried.case.number, tried)).collect();
         let cannot = |error: std::io::Error| files::cannot_write(&path, &error);
         let mut file = OpenOptions::new().create(true).append(true).open(&path).map_err(cannot)?;

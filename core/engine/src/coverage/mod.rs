@@ -10,13 +10,14 @@ mod truths;
 use std::path::Path;
 
 use lacuna::diagnose::coverage::{Case, Coordinate, Coverage, Ended, Noise, tally};
-use lacuna::run::{Observer, Progress, Stop, files};
+use lacuna::run::{Observer, Progress, Silent, Stop, files};
 use lacuna_run::progress::Recorded;
+use lacuna_run::work::Then;
 use lacuna_run::{Artifact, RunDirectory, Stage};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 
+use crate::cases::{self, Visit};
 use crate::study::Study;
 use ground::Ground;
 use log::Log;
@@ -81,6 +82,7 @@ pub fn coverage(
 ) -> Result<Coverage, Stop> {
     refuse(study)?;
     directory.watch(study.faults());
+    directory.uses(study.libraries.all().map(|library| library.sha256.clone()));
     let recorded = Recorded::new(directory.root(), observer);
     let found = counted(study, asked, directory, &recorded);
     recorded.finish(&found);
@@ -95,8 +97,8 @@ fn counted(
     observer: &dyn Observer,
 ) -> Result<Coverage, Stop> {
     let ground = Ground::of(study, asked, directory, observer)?;
-    let inputs =
-        json!([ground.inputs(), (asked.quick, ground.noise, ground.source), study.about.seed]);
+    let inputs = inputs(&ground);
+    let hash = directory.hash_of(&Stage::Coverage.folder(), &inputs)?;
     let wanted = ground.count();
     if directory.has(&Stage::Coverage.folder(), &inputs)? {
         let there = Cases::load(&directory.stage_folder(&Stage::Coverage.folder()))
@@ -107,10 +109,12 @@ fn counted(
     }
     observer.begin(Stage::Coverage.label(), "truth", wanted as u64);
     let kept = directory.keep(&Stage::Coverage.folder(), &inputs, observer, |folder| {
-        cases(&ground, folder, observer).map(|cases| Cases { cases })
+        let (inputs, asked) = (&hash, json!(asked));
+        let all = cases::Cases { study, stage: Stage::Coverage, folder, inputs, asked };
+        tried(&ground, &all, observer).map(|cases| Cases { cases })
     })?;
-    let tried = &kept.value.cases[..wanted.min(kept.value.cases.len())];
-    let cases: Vec<Case> = tried.iter().map(|tried| tried.case.clone()).collect();
+    let counted = &kept.value.cases[..wanted.min(kept.value.cases.len())];
+    let cases: Vec<Case> = counted.iter().map(|tried| tried.case.clone()).collect();
     let tally = tally(&ground.coordinates, &cases);
     observer.end(
         Stage::Coverage.label(),
@@ -124,7 +128,7 @@ fn counted(
         quick: asked.quick,
         noise: ground.noise,
         source: ground.source,
-        noise_ratio: ratio(&ground, tried),
+        noise_ratio: ratio(&ground, counted),
         notes: ground.notes(asked),
         tally,
     };
@@ -162,17 +166,45 @@ fn refuse(study: &Study) -> Result<(), Stop> {
     }
 }
 
+/// Everything on which the cases depend, except for their numbers.
+fn inputs(ground: &Ground<'_>) -> Value {
+    json!([ground.inputs(), (ground.quick, ground.noise, ground.source), ground.study.about.seed])
+}
+
+impl cases::Outcome for Tried {
+    /// A calibration that stopped may not have stopped for a reason of the study.
+    fn is_settled(&self) -> bool {
+        !matches!(self.case.ended, Ended::Failed(_))
+    }
+}
+
+/// The cases in a process that is asked for some of them, as a model.
+pub fn elsewhere(visit: &Visit, then: Then<'_>) -> Result<(), Stop> {
+    let mut directory = visit.directory()?;
+    let ground = Ground::of(&visit.study, &visit.asked()?, &mut directory, &Silent)?;
+    let folder = directory.stage_folder(&visit.stage.folder());
+    let make = |number: usize| trial::run(&ground, number, &folder);
+    visit.serve(&directory, &inputs(&ground), &make, then)
+}
+
 /// All cases; those of an interrupted run are read from its file.
-fn cases(ground: &Ground<'_>, folder: &Path, observer: &dyn Observer) -> Result<Vec<Tried>, Stop> {
+fn tried(
+    ground: &Ground<'_>,
+    all: &cases::Cases<'_>,
+    observer: &dyn Observer,
+) -> Result<Vec<Tried>, Stop> {
+    let folder = all.folder;
     let log = Log::open(folder)?;
     let progress = Progress::new(observer);
-    (0..ground.count()).into_par_iter().try_for_each(|number| -> Result<(), Stop> {
-        if !log.has(number) {
-            log.note(number, trial::run(ground, number, folder)?)?;
-        }
+    let missing: Vec<usize> = (0..ground.count()).filter(|&number| !log.has(number)).collect();
+    progress.add((ground.count() - missing.len()) as u64);
+    let make = |number: usize| trial::run(ground, number, folder);
+    let note = |number: usize, tried: Tried| {
+        log.note(number, tried)?;
         progress.add(1);
         Ok(())
-    })?;
+    };
+    all.compute(&missing, &make, &note, observer)?;
     // The folders of the cases have been removed, except for refined cases.
     let _ = std::fs::remove_dir(folder.join("cases"));
     Ok(log.into_cases())

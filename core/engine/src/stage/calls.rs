@@ -21,6 +21,8 @@ pub struct Calls {
     /// Evaluations that take less time are not kept.
     least: Duration,
     known: Mutex<Known>,
+    /// False if further evaluations stay in memory.
+    writes: bool,
 }
 
 #[derive(Default)]
@@ -63,7 +65,12 @@ impl Calls {
             .filter_map(|line| serde_json::from_slice::<Line>(line).ok())
             .map(|line| (key(line.scenario, &line.inputs), line.response))
             .collect();
-        Self { path, least, known: Mutex::new(Known { responses, file: None }) }
+        Self { path, least, known: Mutex::new(Known { responses, file: None }), writes: true }
+    }
+
+    /// The same, except that further evaluations stay in memory: another process appends to the file.
+    pub fn in_memory(self) -> Self {
+        Self { writes: false, ..self }
     }
 
     /// The response to a scenario for some inputs, if it is known.
@@ -95,11 +102,13 @@ impl Calls {
         let text = serde_json::to_string(&line)
             .map_err(|error| Stop::new(format!("cannot note a response: {error}")))?;
         let failed = |error: std::io::Error| files::cannot_write(&self.path, &error);
-        let file = match &mut known.file {
-            Some(file) => file,
-            none => none.insert(self.created().map_err(failed)?),
-        };
-        writeln!(file, "{text}").map_err(failed)?;
+        if self.writes {
+            let file = match &mut known.file {
+                Some(file) => file,
+                none => none.insert(self.created().map_err(failed)?),
+            };
+            writeln!(file, "{text}").map_err(failed)?;
+        }
         known.responses.insert(key(scenario, inputs), line.response);
         Ok(())
     }

@@ -51,7 +51,8 @@ impl<'a> Direct<'a> {
         let model = study.model.as_ref().map(|m| (m.built.identity(), &m.common));
         let sources = files::hash_sources(&forward.simulator.model.files(&study.directory))?;
         let made_from = json!([model, study.scenarios, study.layouts, sources]);
-        forward.calls = Some(Calls::open(calls_file(run, &made_from)?));
+        let calls = Calls::open(calls_file(run, &made_from)?);
+        forward.calls = Some(if run.is_visited() { calls.in_memory() } else { calls });
         let mut origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
         if forward.is_stochastic() {
             origin = json!([origin, study.about.seed]);

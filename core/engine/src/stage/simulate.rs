@@ -21,10 +21,9 @@ use super::design::Placed;
 use super::imports::Imported;
 use super::simulator::{Setting, Simulator};
 use crate::study::Study;
-use log::Log;
 use table::is_whole;
 
-pub use log::{Roll, earlier};
+pub use log::{Log, Roll, earlier};
 pub(super) use table::{TABLE, from_table, inside};
 
 /// Runs of all scenarios.
@@ -178,6 +177,9 @@ pub fn kept(
     let strict = *stage == Stage::Simulate.folder() && none_may_fail(study, asked.names.len());
     let make = |folder: &Path| simulate(study, simulator, asked, strict, folder, observer);
     let kept = run.keep(stage, &inputs, observer, make)?;
+    if run.is_visited() {
+        return Ok(kept);
+    }
     let damaged = if kept.fresh { 0 } else { kept.value.damaged(&folder) };
     if damaged > 0 {
         observer.remark(&format!(
@@ -371,7 +373,8 @@ pub fn names(count: usize) -> Vec<String> {
     (1..=count).map(|i| format!("run{i:0digits$}")).collect()
 }
 
-fn record(run: &str, finished: Finished, folder: &Path) -> Result<RunRecord, Stop> {
+/// The record of a run that has ended.
+pub fn record(run: &str, finished: Finished, folder: &Path) -> Result<RunRecord, Stop> {
     let run = run.to_owned();
     let seconds = finished.seconds;
     Ok(match finished.outcome {

@@ -346,7 +346,7 @@ const OF_RECORDS: [&str; 6] = [
 ];
 
 /// The sections whose plugins see the parameters and conditions of the runs.
-const OF_RUNS: [&str; 4] = ["design", "executor", "simulations", "surrogate"];
+const OF_RUNS: [&str; 5] = ["design", "executor", "cases", "simulations", "surrogate"];
 
 /// Calls `look` for every plugin with complaints about its own section.
 pub(super) fn each_plugin(

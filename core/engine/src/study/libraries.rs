@@ -152,7 +152,7 @@ pub enum Use {
     Run,
     /// To check it: no plugin library is loaded, since that would run its code.
     Check,
-    /// To read the results of a run: the model and the executor, which are not used, may be unavailable.
+    /// To read the results of a run: the model and the executors, which are not used, may be unavailable.
     Look,
 }
 

@@ -292,7 +292,7 @@ fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems
         let scenarios =
             if section == "measurements" { measured.as_slice() } else { context.scenarios };
         if purpose != Use::Look
-            || !["model", "numerical_error", "low_fidelity", "executor"].contains(&section)
+            || !["model", "numerical_error", "low_fidelity", "executor", "cases"].contains(&section)
         {
             let starts_programs = purpose != Use::Check;
             component.environment(&Context { starts_programs, scenarios, ..*context }, complaints);

@@ -142,6 +142,7 @@ sections! {
     model: plugin(Model, ModelKeys);
     design: plugin(Design, DesignKeys);
     executor: plugin(Executor, NoKeys, else "local");
+    cases: plugin(Executor, NoKeys);
     simulations: plugin(Reader, SimulationKeys);
     measurements: plugin(Reader, MeasurementKeys);
     surrogate: plugin(Surrogate, SurrogateKeys);

@@ -18,7 +18,7 @@ pub use evaluate::{Ended, evaluate};
 pub use limits::Limits;
 pub use marker::{Begun, Marker, Outcome};
 pub use order::Order;
-pub use worker::{Assignment, hostname, work};
+pub use worker::{Assignment, Then, WithModel, hostname, work};
 
 /// Folder of orders and markers inside the folder of the runs.
 pub fn folder(runs: &Path) -> PathBuf {

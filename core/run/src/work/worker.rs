@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use lacuna::plugin::executor::{Batch, Job, Load};
+use lacuna::plugin::Model;
+use lacuna::plugin::executor::{Batch, Job, Recipe};
 use lacuna::run::{Stop, files};
 
 use super::{Begun, Limits, Marker, Order, Outcome, evaluate, memory, now};
@@ -40,39 +41,45 @@ struct Worker<'a> {
     host: String,
 }
 
+/// Receives the model of an order.
+pub type Then<'a> = &'a mut dyn FnMut(&dyn Model) -> Result<(), Stop>;
+
+/// Builds the model of an order, whose runs lie in this folder, and hands it over.
+pub type WithModel<'a> = dyn Fn(&Recipe, &Path, Then<'_>) -> Result<(), Stop> + 'a;
+
 /// Makes the runs of an assignment; each leaves a marker. A run that already has one is not repeated.
 ///
-/// `load` loads the libraries that contain plugins of the model. Lines read from the input are answered
+/// Lines read from the input are answered
 /// (`done run001 run002`), for a caller that hands out runs one by one.
 pub fn work(
     assignment: &Assignment,
-    load: &Load<'_>,
+    with_model: &WithModel<'_>,
     input: &mut dyn BufRead,
     output: &mut dyn Write,
 ) -> Result<(), Stop> {
     assignment.limits.apply()?;
     let order = Order::read(&assignment.order)?;
-    let model = order.model.build(load)?;
     let runs = runs_folder(&assignment.order, &order)?;
-    let worker = Worker {
-        batch: order.batch(&*model, &runs),
-        asked: order.fingerprints()?,
-        order: name_of(&assignment.order)?,
-        host: hostname(),
-    };
-    match assignment.task {
-        Some(task) => {
-            let jobs = order.tasks.get(task).ok_or_else(|| {
-                let (all, folder) = (order.tasks.len(), assignment.order.display());
-                Stop::new(format!(
-                    "the order in {folder} has no task {task}, only 0 to {}",
-                    all.saturating_sub(1)
-                ))
-            })?;
-            worker.task(jobs, assignment.parallel.max(1))
+    let (asked, name) = (order.fingerprints()?, name_of(&assignment.order)?);
+    with_model(&order.model, &runs, &mut |model| {
+        let worker = Worker {
+            batch: order.batch(model, &runs),
+            asked: asked.clone(),
+            order: name.clone(),
+            host: hostname(),
+        };
+        match assignment.task {
+            Some(task) => worker.task(jobs_of(&order, task)?, assignment.parallel.max(1)),
+            None => worker.lines(input, output),
         }
-        None => worker.lines(input, output),
-    }
+    })
+}
+
+fn jobs_of(order: &Order, task: usize) -> Result<&[usize], Stop> {
+    order.tasks.get(task).map(Vec::as_slice).ok_or_else(|| {
+        let last = order.tasks.len().saturating_sub(1);
+        Stop::new(format!("the order has no task {task}, only 0 to {last}"))
+    })
 }
 
 fn name_of(folder: &Path) -> Result<String, Stop> {

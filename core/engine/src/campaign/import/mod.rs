@@ -114,7 +114,7 @@ fn take(
     let names = study.scenarios.iter().map(|scenario| scenario.name.clone());
     let folders = made.scenarios.iter().map(|made| made.folder.clone());
     let runs = rows.iter().map(|row| row.run.clone()).collect();
-    Roll { scenarios: names.zip(folders).collect(), runs }.write(folder)?;
+    Roll { scenarios: names.zip(folders).collect(), runs, executor: None }.write(folder)?;
     read::ensemble_of(study, &study.parameters, Some(Runs { folder, made: &made }))?;
     Ok(rows.iter().map(|row| row.run.clone()).collect())
 }

@@ -5,7 +5,10 @@ use std::fs::{self, File, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use lacuna::plugin::Executor;
+use lacuna::plugin::registry::{self, Built};
 use lacuna::run::{Stop, files};
+use lacuna::text::emit;
 use serde::{Deserialize, Serialize};
 
 use super::{Asked, RunRecord};
@@ -21,13 +24,45 @@ pub struct Roll {
     pub scenarios: Vec<(String, PathBuf)>,
     /// Names of the runs.
     pub runs: Vec<String>,
+    /// Executor of the runs, if it is not that of the study.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub executor: Option<Own>,
+}
+
+/// An executor as it was chosen.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Own {
+    /// Name of its plugin.
+    #[serde(rename = "use")]
+    pub name: String,
+    /// All options as TOML.
+    pub options: String,
+}
+
+impl Own {
+    /// Builds the executor.
+    pub fn build(&self) -> Result<Box<dyn Executor>, Stop> {
+        let built = registry::from_text::<dyn Executor>(&self.name, &self.options);
+        built.map(|built| built.plugin).map_err(|complaints| {
+            Stop::new(format!("the executor `{}` cannot be built:\n{complaints}", self.name))
+        })
+    }
 }
 
 impl Roll {
     pub(super) fn of(asked: Asked<'_>, simulator: &Simulator<'_>) -> Self {
         let scenario = |s: &super::Setting<'_>| (s.scenario.name.clone(), s.folder.clone());
         let scenarios = simulator.settings.iter().map(scenario).collect();
-        Self { scenarios, runs: asked.names.to_vec() }
+        Self { scenarios, runs: asked.names.to_vec(), executor: None }
+    }
+
+    /// Cases of a stage, which this executor computes.
+    pub fn of_cases(runs: Vec<String>, executor: &Built<dyn Executor>) -> Result<Self, Stop> {
+        let options = emit::to_toml(&executor.options).map_err(|error| {
+            Stop::new(format!("cannot write the options of `{}`: {error}", executor.name))
+        })?;
+        let executor = Some(Own { name: executor.name.to_owned(), options });
+        Ok(Self { scenarios: vec![(String::new(), PathBuf::new())], runs, executor })
     }
 
     /// Writes the list into the folder of a stage.
@@ -43,13 +78,14 @@ impl Roll {
 }
 
 /// File to which each finished run is appended.
-pub(super) struct Log {
+pub struct Log {
     path: PathBuf,
     file: File,
 }
 
 impl Log {
-    pub(super) fn open(folder: &Path) -> Result<Self, Stop> {
+    /// Opens the file in the folder of the runs.
+    pub fn open(folder: &Path) -> Result<Self, Stop> {
         let path = folder.join(LOG);
         let file = OpenOptions::new().create(true).append(true).open(&path);
         let mut file = file.map_err(|error| files::cannot_write(&path, &error))?;
@@ -60,7 +96,8 @@ impl Log {
         Ok(Self { path, file })
     }
 
-    pub(super) fn note(&mut self, record: &RunRecord) -> Result<(), Stop> {
+    /// Appends the record of a finished run.
+    pub fn note(&mut self, record: &RunRecord) -> Result<(), Stop> {
         let line = serde_json::to_string(record)
             .map_err(|e| Stop::new(format!("cannot note a finished run: {e}")))?;
         writeln!(self.file, "{line}").map_err(|error| files::cannot_write(&self.path, &error))
