@@ -1,4 +1,4 @@
-//! Cases of `lacuna coverage` in other processes and on a cluster.
+//! Cases of `lacuna coverage` and `lacuna power` in other processes and on a cluster.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -220,6 +220,42 @@ fn a_process_that_sees_something_else_says_so() {
     fs::write(&task, text.replacen("\"inputs\": \"", "\"inputs\": \"0", 1)).unwrap();
     let said = work();
     assert!(said.contains("are now those of another study"), "{said}");
+}
+
+/// `lacuna power` of a small study, 70 cases.
+fn power(folder: &Path, out: &Path, settings: &[&str]) -> Command {
+    let mut command = quick::command();
+    command.args(["power", "--quick", "--threads", "2", "--out"]).arg(out);
+    command.arg(folder.join("study.toml"));
+    command.args(["--set", "gap.candidates=[\"gain\", \"offset\"]", "--set", SHORT]);
+    command.args(settings.iter().flat_map(|setting| ["--set", setting]));
+    command
+}
+
+#[test]
+fn power_gives_the_same_rates_in_processes() {
+    let folder = quick::tables();
+    let [here, there] = ["here", "there"].map(|name| folder.path().join(name));
+    ends(&mut power(folder.path(), &here, &[]));
+    // It is interrupted first.
+    let cases = there.join("7-power/cases.jsonl");
+    let log = || fs::read_to_string(&cases).unwrap_or_default();
+    let mut child = silent(&mut power(folder.path(), &there, &[PROCESSES]));
+    wait_for("the tenth case", &mut child, || log().lines().count() >= 10);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let before = log();
+    ends(&mut power(folder.path(), &there, &[PROCESSES]));
+    assert!(log().starts_with(&before));
+    let rates = |out: &Path| fs::read_to_string(out.join("7-power/power.json")).unwrap();
+    assert_eq!(rates(&there), rates(&here));
+    let sorted = |out: &Path| {
+        let text = fs::read_to_string(out.join("7-power/cases.jsonl")).unwrap();
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        lines.sort();
+        lines
+    };
+    assert_eq!(sorted(&there), sorted(&here));
 }
 
 /// Seven cases on a cluster, three a job: one array of three tasks. The process that asked is killed while they run.

@@ -12,10 +12,12 @@
 
 use lacuna::plugin::Density;
 use lacuna::plugin::registry::{NoKeys, Section};
-use lacuna::run::{Listener, Observer, Stop, files};
+use lacuna::run::{Listener, Observer, Silent, Stop, files};
 use lacuna_run::progress::Recorded;
+use lacuna_run::work::Then;
 use lacuna_run::{Kept, RunDirectory, Stage};
 
+use crate::cases::Visit;
 use crate::gap::inside::{companion, runs};
 use crate::gap::power::{PowerDesign, Rates, stage as power};
 use crate::gap::report::reliability::power_page;
@@ -154,6 +156,18 @@ fn plant(
     let page = run.stage_folder(&Stage::Power.folder()).join("power.html");
     files::write_atomic(&page, power_page(&study.about.title, &kept.value).as_bytes())?;
     Ok(kept.value)
+}
+
+/// Hands over the cases of [`power`], in a process that is asked for some of them, as a model.
+pub fn power_elsewhere(visit: &Visit, then: Then<'_>) -> Result<(), Stop> {
+    let (study, mut run) = (&visit.study, visit.directory()?);
+    if study.surrogate.is_some() {
+        let (emulated, _) = calibrate_emulated(study, &mut run, &Silent)?;
+        power::elsewhere(visit, &emulated.problem(), &mut run, then)
+    } else {
+        let direct = Direct::of(study, &mut run, &Silent)?.fitted(study, &mut run, &Silent)?;
+        power::elsewhere(visit, &direct.problem(), &mut run, then)
+    }
 }
 
 fn pursue(

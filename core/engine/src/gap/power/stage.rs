@@ -4,18 +4,22 @@ use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 use std::path::Path;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
-use lacuna::run::{Observer, Progress, Stop, files};
+use lacuna::math::random::Stream;
+use lacuna::run::{Observer, Progress, Silent, Stop, files};
+use lacuna_run::work::Then;
 use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
-use rayon::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 
+use crate::cases::{Cases, Outcome, Visit};
 use crate::gap::candidates::{place, sensors};
 use crate::gap::experiment::{Experiment, MeasuredCurve};
 use crate::gap::inside::InsideCandidates;
 use crate::gap::inside::Pieces;
-use crate::gap::power::{CaseOutcome, PowerDesign, PowerSetting, Rates, Screen, plan, rates, run};
+use crate::gap::power::{
+    CaseOutcome, Injection, PowerDesign, PowerSetting, Rates, Screen, plan, rates, run,
+};
 use crate::gap::stage as gap;
 use crate::gap::stage::prepared::{PreparedSearch, prepared};
 use crate::gap::stage::search_model::SearchModel;
@@ -47,15 +51,57 @@ pub fn stage(
     directory: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Kept<Rates>, Stop> {
-    let inputs = json!([gap::inputs(study, problem), design, simulations]);
+    let asked = json!([design, simulations]);
+    let inputs = inputs(study, problem, &asked);
+    let hash = directory.hash_of(&Stage::Power.folder(), &inputs)?;
     let pieces = Pieces::of(study)?;
     let inside = InsideCandidates::of(pieces.as_ref(), study, problem, directory, observer)?;
     directory.keep(&Stage::Power.folder(), &inputs, observer, |folder| {
+        let all = Cases { study, stage: Stage::Power, folder, inputs: &hash, asked };
         let beginning = SearchModel::own(study, problem, &inside);
         prepared(study, problem, &beginning, &stream(study, "gap"), |prepared| {
-            outcomes(study, prepared, design, simulations, folder, observer)
+            with_setting(study, prepared, simulations, |setting, stream| {
+                outcomes(setting, &plan(design, prepared.candidates), stream, &all, observer)
+            })
         })
         .map(|outcomes| Rates { search: search(study, problem), ..rates(&outcomes) })
+    })
+}
+
+/// Everything on which the cases depend, except for their numbers.
+fn inputs(study: &Study, problem: &InverseProblem<'_>, asked: &Value) -> Value {
+    json!([gap::inputs(study, problem), asked[0], asked[1]])
+}
+
+impl Outcome for Option<CaseOutcome> {}
+
+/// The cases in a process that is asked for some of them, as a model.
+pub fn elsewhere(
+    visit: &Visit,
+    problem: &InverseProblem<'_>,
+    directory: &mut RunDirectory,
+    then: Then<'_>,
+) -> Result<(), Stop> {
+    let study = &visit.study;
+    let asked: Value = visit.asked()?;
+    let (design, simulations): (PowerDesign, Option<usize>) = visit.asked()?;
+    let pieces = Pieces::of(study)?;
+    let inside = InsideCandidates::of(pieces.as_ref(), study, problem, directory, &Silent)?;
+    let beginning = SearchModel::own(study, problem, &inside);
+    prepared(study, problem, &beginning, &stream(study, "gap"), |prepared| {
+        let faults: Vec<_> = prepared.candidates.iter().flat_map(|c| c.effect.faults()).collect();
+        let plan = plan(&design, prepared.candidates);
+        with_setting(study, prepared, simulations, |setting, stream| {
+            let make = |case: usize| {
+                let wanted = plan.get(case).ok_or_else(|| Stop::new(format!("no case {case}")))?;
+                let outcome = run(setting, case, wanted, &stream.at(case as u64));
+                faults
+                    .iter()
+                    .find_map(|fault| fault.said())
+                    .map_or(Ok(outcome), |said| Err(Stop::new(said)))
+            };
+            visit.serve(directory, &inputs(study, problem, &asked), &make, then)
+        })
     })
 }
 
@@ -96,15 +142,13 @@ fn places(study: &Study, experiment: &Experiment<'_>) -> Vec<f64> {
     all.iter().map(|x| (x - low) / length).collect()
 }
 
-/// The outcomes of all cases, those of an interrupted run taken from its file.
-fn outcomes(
+/// Passes on what all cases share, and their random stream: the search on the data themselves gives fit and noise.
+fn with_setting<T>(
     study: &Study,
     prepared: &PreparedSearch<'_>,
-    design: &PowerDesign,
     simulations: Option<usize>,
-    folder: &Path,
-    observer: &dyn Observer,
-) -> Result<Vec<CaseOutcome>, Stop> {
+    use_it: impl FnOnce(&PowerSetting<'_>, &Stream) -> Result<T, Stop>,
+) -> Result<T, Stop> {
     let found = prepared.search(&|_| {})?;
     // What the data themselves hide is part of no case.
     let first = found.path.first().map_or(&found.last, |step| &step.before);
@@ -121,26 +165,34 @@ fn outcomes(
         places: &places(study, experiment),
         screen: &Screen::of(experiment, candidates, fit, noise),
     };
-    let plan = plan(design, prepared.candidates);
-    let path = folder.join(CASES);
-    let done = Mutex::new(read(&path)?);
+    use_it(&setting, &prepared.random.named("power"))
+}
+
+/// The outcomes of all cases, those of an interrupted run taken from its file.
+fn outcomes(
+    setting: &PowerSetting<'_>,
+    plan: &[Injection],
+    stream: &Stream,
+    all: &Cases<'_>,
+    observer: &dyn Observer,
+) -> Result<Vec<CaseOutcome>, Stop> {
+    let path = all.folder.join(CASES);
+    let done = read(&path)?;
     let file = Mutex::new(append(&path)?);
     observer.begin(Stage::Power.label(), "case", plan.len() as u64);
     let progress = Progress::new(observer);
-    let stream = prepared.random.named("power");
-    plan.par_iter().enumerate().try_for_each(|(case, wanted)| -> Result<(), Stop> {
-        let is_done = done.lock().is_ok_and(|done| done.contains_key(&case));
-        if !is_done {
-            let outcome = run(&setting, case, wanted, &stream.at(case as u64));
-            write(&file, &path, case, outcome.as_ref())?;
-            if let Ok(mut done) = done.lock() {
-                done.insert(case, outcome);
-            }
-        }
+    let missing: Vec<usize> = (0..plan.len()).filter(|case| !done.contains_key(case)).collect();
+    progress.add(done.len() as u64);
+    let done = Mutex::new(done);
+    let make = |case: usize| Ok(run(setting, case, &plan[case], &stream.at(case as u64)));
+    let note = |case: usize, outcome: Option<CaseOutcome>| {
+        write(&file, &path, case, outcome.as_ref())?;
+        done.lock().unwrap_or_else(PoisonError::into_inner).insert(case, outcome);
         progress.add(1);
         Ok(())
-    })?;
-    let done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    };
+    all.compute(&missing, &make, &note, observer)?;
+    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     observer.end(Stage::Power.label(), &format!("{} cases", done.len()));
     Ok(done.into_values().flatten().collect())
 }
@@ -175,6 +227,6 @@ fn write(
     outcome: Option<&CaseOutcome>,
 ) -> Result<(), Stop> {
     let line = json!([case, outcome]).to_string() + "\n";
-    let mut file = file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
     file.write_all(line.as_bytes()).map_err(|error| files::cannot_write(path, &error))
 }
