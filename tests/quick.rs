@@ -29,16 +29,22 @@ pub fn simulated() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("quick/study.toml");
     fs::copy(here, folder.path().join("study.toml")).unwrap();
-    let all = fs::read_to_string(root().join("configs/sns/strain.csv")).unwrap();
-    let wanted = |line: &&str| {
+    let table = root().join("configs/sns/strain.csv");
+    write_early(&table, folder.path(), |sensor| ["B", "C", "U"].contains(&sensor));
+    folder
+}
+
+/// Writes the first fifth of a millisecond of a table of strain, of the sensors that are wanted, as `strain.csv`.
+pub fn write_early(table: &Path, folder: &Path, wanted: impl Fn(&str) -> bool) {
+    let all = fs::read_to_string(table).unwrap();
+    let is_early = |line: &&str| {
         let cells: Vec<&str> = line.split(',').collect();
         let time: f64 = cells[2].parse().unwrap_or(0.0);
-        ["sensor", "B", "C", "U"].contains(&cells[1]) && time < 2.05e-4
+        (cells[1] == "sensor" || wanted(cells[1])) && time < 2.05e-4
     };
     let some: Vec<&str> =
-        all.lines().filter(|line| !line.starts_with('#')).filter(wanted).collect();
-    fs::write(folder.path().join("strain.csv"), some.join("\n") + "\n").unwrap();
-    folder
+        all.lines().filter(|line| !line.starts_with('#')).filter(is_early).collect();
+    fs::write(folder.join("strain.csv"), some.join("\n") + "\n").unwrap();
 }
 
 /// A folder with the study that `lacuna new study` writes: runs and measurements in tables.
