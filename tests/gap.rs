@@ -1,7 +1,7 @@
 //! The gap workflow on data in which an effect is hidden.
 //!
 //! `LACUNA_GAP_CASES` is the number of single effects at each of two sizes; all other numbers scale with it. An
-//! ordinary run takes a few, at least one of each kind. The full run, whose tables are in `docs/gap_rates.md`, takes
+//! ordinary run takes a few, one of each kind. The full run, whose tables are in `docs/gap_rates.md`, takes
 //! 126:
 //!
 //! ```text

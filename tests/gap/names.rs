@@ -124,9 +124,10 @@ fn misses(all: &[Asked], missed: impl Fn(&Asked) -> bool) {
     }
 }
 
-/// Rates for single effects of a size; the rate of correct types has the lower bound `demanded`.
-fn singles(family: u64, ratio: f64, cases: u64, demanded: f64) {
-    let all = asked(family, (0..cases).map(|i| single(i, ratio)).collect());
+/// Rates for single effects of a size, from the kind of this number on; the rate of correct types has the lower bound
+/// `demanded`.
+fn singles(family: u64, ratio: f64, (first, cases): (u64, u64), demanded: f64) {
+    let all = asked(family, (first..first + cases).map(|i| single(i, ratio)).collect());
     let sure: Vec<&Asked> = all.iter().filter(|a| named(a)).collect();
     let type_right = Rate::of(&all, right_or_alike);
     let in_class = Rate::of(&all, inside);
@@ -158,13 +159,16 @@ fn singles(family: u64, ratio: f64, cases: u64, demanded: f64) {
 /// Requirement: the type is right in 90 of 100 cases at half the noise of one replicate.
 #[test]
 fn half_as_large_as_the_noise() {
-    singles(1, 0.5, count(126, 7), 0.90);
+    singles(1, 0.5, (0, count(126, 7)), 0.90);
 }
 
-/// Requirement: the type is right in 95 of 100 cases at the noise of one replicate.
+/// Requirement: the type is right in 95 of 100 cases at the noise of one replicate. A short run has the other half of the
+/// kinds.
 #[test]
 fn as_large_as_the_noise() {
-    singles(2, 1.0, count(126, 14), 0.95);
+    let (kinds, cases) = (LISTED.len() as u64, count(126, 7));
+    let first = if cases < kinds { kinds / 2 } else { 0 };
+    singles(2, 1.0, (first, cases), 0.95);
 }
 
 /// Requirement: at most five false alarms in a hundred. The levels of the tests are three and two per cent.
