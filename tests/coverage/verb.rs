@@ -41,12 +41,15 @@ fn cases(out: &Path) -> String {
     fs::read_to_string(out.join(Stage::Coverage.folder().name()).join("cases.json")).unwrap()
 }
 
+/// Half as many steps as in the study: a few hundred effective draws.
+const SHORT: [&str; 1] = ["sampler.steps=1500"];
+
 /// Closed form: intervals have their nominal coverage, ranks are uniform, and the width of the posterior is known.
 #[test]
 fn a_posterior_in_closed_form_is_nominal() {
     let folder = study(0.5);
     let out = folder.path().join("out");
-    let found = count(folder.path(), &out, &[], &asked(200, Some(Noise::Prior))).unwrap();
+    let found = count(folder.path(), &out, &SHORT, &asked(200, Some(Noise::Prior))).unwrap();
     assert_eq!(found.tally.verdict.word, Word::Nominal, "{}", found.tally.verdict.text);
     assert_eq!((found.tally.calibrated, found.source), (200, Source::Model));
     let exact = line::posterior(&vec![vec![0.0; 6]; 8], 0.5);
@@ -71,13 +74,13 @@ fn a_posterior_in_closed_form_is_nominal() {
 fn noise_that_is_stated_too_small_is_found_in_the_replicates() {
     let folder = study(1.5);
     let out = folder.path().join("out");
-    let found = count(folder.path(), &out, &[], &asked(100, Some(Noise::Replicates))).unwrap();
+    let found = count(folder.path(), &out, &SHORT, &asked(100, Some(Noise::Replicates))).unwrap();
     assert_eq!(found.tally.verdict.word, Word::TooNarrow, "{}", found.tally.verdict.text);
     // 2 Phi(1.96 / 3) - 1, within four standard errors, with the two unknowns counted as one.
     let share = found.tally.overall.as_ref().unwrap().levels[2].share;
     assert!((share - 0.486).abs() < 4.0 * (0.25_f64 / 100.0).sqrt(), "{share}");
     assert!((found.noise_ratio.unwrap() - 1.0).abs() < 0.15, "{found:?}");
-    let stated = count(folder.path(), &out, &[], &asked(40, None)).unwrap();
+    let stated = count(folder.path(), &out, &SHORT, &asked(40, None)).unwrap();
     // Eight replicates are too few to serve as the noise unless requested.
     assert_eq!(stated.noise, Noise::Posterior);
     assert_ne!(stated.tally.verdict.word, Word::TooNarrow);
