@@ -131,7 +131,8 @@ fn measurements(study: &Study) -> Result<Vec<Column>, Stop> {
                 stop.help("take `covariance` out of the section, and name it beside the table")
             );
         }
-        parts.push(Part { label: label.map(str::to_owned), layout, replicates: data.replicates });
+        let replicates = data.replicates.into_iter().collect();
+        parts.push(Part { label: label.map(str::to_owned), layout, replicates });
     }
     columns_of_measurements(&parts)
 }
