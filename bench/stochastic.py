@@ -4,7 +4,7 @@
 
 LACUNA is the program. The first model is `location + u` with a uniform number from -1 to 1 in each run, and normal noise;
 its posterior is computed here by quadrature. The second draws the effects of eight schools at random, and the posterior of
-their mean and standard deviation is that of the posteriordb, from tests/truth/posteriordb/data.
+their mean and standard deviation is that of the posteriordb, from tests/posteriordb/data.
 Prints a table in Markdown; finished runs in FOLDER are used again. Needs no package.
 """
 
@@ -59,7 +59,7 @@ def exact():
     return mean, math.sqrt(sums[2] / sums[0] - mean * mean)
 
 
-REFERENCE = "tests/truth/posteriordb/data/eight_schools-eight_schools_noncentered.json"
+REFERENCE = "tests/posteriordb/data/eight_schools-eight_schools_noncentered.json"
 
 MODEL = """import random
 

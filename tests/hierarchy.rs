@@ -45,7 +45,7 @@ fn draws(ran: &Ran, names: &[&str]) -> Vec<Vec<f64>> {
 
 /// The file of eight schools: data, and moments of reference draws by posteriordb.
 fn reference() -> Value {
-    let file = "tests/truth/posteriordb/data/eight_schools-eight_schools_noncentered.json";
+    let file = "tests/posteriordb/data/eight_schools-eight_schools_noncentered.json";
     serde_json::from_str(&fs::read_to_string(quick::root().join(file)).unwrap()).unwrap()
 }
 

@@ -2,6 +2,5 @@
 
 mod calibration;
 mod emulated;
-mod posteriordb;
 mod posteriors;
 mod runs;

@@ -1,4 +1,4 @@
-//! Simulation-based calibration of every sampler with every discrepancy.
+//! Simulation-based calibration of every sampler with the discrepancies.
 //!
 //! Source: Talts, Betancourt, Simpson, Vehtari and Gelman, *Validating Bayesian inference algorithms with
 //! simulation-based calibration*, arXiv 1804.06788. Parameters and hyperparameters are drawn from their priors, data
@@ -6,6 +6,9 @@
 //! passes if the chi-square test of its least uniform coordinate has p > 0.01, corrected for the number of coordinates.
 //! With many pairs some fail by chance; such a pair is repeated once with four times as many simulations and other
 //! random numbers, and must then pass: a correct pair fails both with probability 1e-4.
+//!
+//! Each change runs each sampler with four of the discrepancies, and each of these with at least five samplers;
+//! `LACUNA_TRUTH=1` takes all pairs.
 
 use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
 use lacuna::math::distribution::Distribution;
@@ -171,24 +174,29 @@ fn p_value(sampler: (&str, &str), discrepancy: (&str, &str), count: u64, stream:
     (coordinates as f64 * smallest).min(1.0)
 }
 
-/// Tests every pair of the lists.
-fn judge(samplers: &[(&str, &str)], discrepancies: &[(&str, &str)]) {
+/// Tests a sampler with each of these discrepancies.
+fn judge_with(sampler: (&str, &str), discrepancies: &[(&str, &str)]) {
     let mut failed = Vec::new();
-    for &sampler in samplers {
-        for &discrepancy in discrepancies {
-            let stream = Stream::root(20_180_418).named(sampler.0).named(discrepancy.1);
-            let first = p_value(sampler, discrepancy, SIMULATIONS, &stream.named("first"));
-            if first > 0.01 {
-                continue;
-            }
-            let second = p_value(sampler, discrepancy, 4 * SIMULATIONS, &stream.named("second"));
-            if second <= 0.01 {
-                let names = format!("{} with {} ({})", sampler.0, discrepancy.0, discrepancy.1);
-                failed.push(format!("{names}: p = {first:.1e}, then {second:.1e}"));
-            }
+    for &discrepancy in discrepancies {
+        let stream = Stream::root(20_180_418).named(sampler.0).named(discrepancy.1);
+        let first = p_value(sampler, discrepancy, SIMULATIONS, &stream.named("first"));
+        if first > 0.01 {
+            continue;
+        }
+        let second = p_value(sampler, discrepancy, 4 * SIMULATIONS, &stream.named("second"));
+        if second <= 0.01 {
+            let names = format!("{} with {} ({})", sampler.0, discrepancy.0, discrepancy.1);
+            failed.push(format!("{names}: p = {first:.1e}, then {second:.1e}"));
         }
     }
     assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+/// Tests the sampler of this number, from which its four discrepancies follow.
+fn judge(number: usize, sampler: (&str, &str)) {
+    let all = DISCREPANCIES.len();
+    let some = [0, 2, 3, 5].map(|step| DISCREPANCIES[(number + step) % all]);
+    judge_with(sampler, if runs::every_one() { &DISCREPANCIES } else { &some });
 }
 
 /// All discrepancies, with priors that do not depend on the data.
@@ -214,52 +222,52 @@ const DISCREPANCIES: [(&str, &str); 7] = [
 
 #[test]
 fn affine_invariant_ensemble() {
-    judge(&[("affine_invariant_ensemble", "walkers = 24\nsteps = 600")], &DISCREPANCIES);
+    judge(0, ("affine_invariant_ensemble", "walkers = 24\nsteps = 600"));
 }
 
 #[test]
 fn metropolis() {
-    judge(&[("metropolis", "steps = 1500")], &DISCREPANCIES);
+    judge(1, ("metropolis", "steps = 1500"));
 }
 
 #[test]
 fn adaptive_metropolis() {
-    judge(&[("adaptive_metropolis", "steps = 2000\nwarm_up = 500")], &DISCREPANCIES);
+    judge(2, ("adaptive_metropolis", "steps = 2000\nwarm_up = 500"));
 }
 
 #[test]
 fn delayed_rejection_adaptive_metropolis() {
     let options = "steps = 1500\nwarm_up = 500";
-    judge(&[("delayed_rejection_adaptive_metropolis", options)], &DISCREPANCIES);
+    judge(3, ("delayed_rejection_adaptive_metropolis", options));
 }
 
 #[test]
 fn differential_evolution() {
-    judge(&[("differential_evolution", "steps = 2000\nwarm_up = 500")], &DISCREPANCIES);
+    judge(4, ("differential_evolution", "steps = 2000\nwarm_up = 500"));
 }
 
 #[test]
 fn hamiltonian() {
-    judge(&[("hamiltonian", "steps = 300\nwarm_up = 150")], &DISCREPANCIES);
+    judge(5, ("hamiltonian", "steps = 300\nwarm_up = 150"));
 }
 
 #[test]
 fn no_u_turn() {
-    judge(&[("no_u_turn", "steps = 300\nwarm_up = 150")], &DISCREPANCIES);
+    judge(6, ("no_u_turn", "steps = 300\nwarm_up = 150"));
 }
 
 #[test]
 fn sequential_monte_carlo() {
-    judge(&[("sequential_monte_carlo", "particles = 300")], &DISCREPANCIES);
+    judge(7, ("sequential_monte_carlo", "particles = 300"));
 }
 
 #[test]
 fn nested() {
-    judge(&[("nested", "live = 100")], &DISCREPANCIES);
+    judge(8, ("nested", "live = 100"));
 }
 
 /// An approximate method: calibrated if its Pareto k-hat allows its draws to be corrected.
 #[test]
 fn variational() {
-    judge(&[("variational", "draws = 1000")], &DISCREPANCIES[..3]);
+    judge_with(("variational", "draws = 1000"), &DISCREPANCIES[..3]);
 }

@@ -3,13 +3,19 @@
 //! A sampler passes if the mean and the standard deviation of every published quantity agree with the reference draws
 //! within three Monte Carlo errors of both combined. Of a few hundred quantities some fail by chance: they are repeated
 //! once with other random numbers, where all must agree.
+//!
+//! Each change runs every sampler on some posteriors, the hardest among them; the whole list for each takes some minutes:
+//!
+//! ```sh
+//! LACUNA_TRUTH=1 cargo test --release --workspace --test all -- truth::
+//! ```
 
 use lacuna::math::moments::{mean, variance};
 use lacuna::math::random::Stream;
 use lacuna_engine::posterior::{Given, Posterior};
 use lacuna_linalg::Matrix;
+use posteriordb::Reference;
 
-use super::posteriordb::{self, Reference};
 use super::runs::{self, Estimate, Run};
 
 /// Regressions, time series and hierarchical models: twelve posteriors of three to ten unknowns.
@@ -28,7 +34,7 @@ const PLAIN: [&str; 12] = [
     "sblri-blr",
 ];
 
-/// Half of them, for samplers that take longer; the whole list is a long run (`every_posterior`).
+/// Half of them, for random walks.
 const HALF: [&str; 6] = [
     "arK-arK",
     "eight_schools-eight_schools_noncentered",
@@ -38,7 +44,7 @@ const HALF: [&str; 6] = [
     "nes1980-nes",
 ];
 
-/// A quarter of them, a hierarchy, a time series and a mixture, for those that evaluate most gradients.
+/// A quarter of them, a hierarchy, a time series and a mixture, for samplers that take longer.
 const QUARTER: [&str; 3] = [
     "eight_schools-eight_schools_noncentered",
     "garch-garch11",
@@ -97,7 +103,9 @@ fn judge(reference: &Reference, mean: Estimate, sd: Estimate, tails: f64) -> Opt
     of_mean.into_iter().chain(of_sd).reduce(|a, b| format!("{a}; {b}"))
 }
 
+/// Runs a sampler on these posteriors, or on all of them if they are asked for.
 fn all(names: &[&str], sampler: (&str, &str)) {
+    let names = if runs::every_one() { &PLAIN[..] } else { names };
     let mut failed = Vec::new();
     for posterior in posteriordb::posteriors().iter().filter(|p| names.contains(&p.name)) {
         let stream = Stream::root(28).named(posterior.name);
@@ -124,32 +132,32 @@ fn hamiltonian() {
 
 #[test]
 fn affine_invariant_ensemble() {
-    all(&HALF, ("affine_invariant_ensemble", "walkers = 60\nsteps = 4000"));
+    all(&QUARTER, ("affine_invariant_ensemble", "walkers = 60\nsteps = 4000"));
 }
 
 #[test]
 fn metropolis() {
-    all(&PLAIN, ("metropolis", "steps = 20000"));
+    all(&HALF, ("metropolis", "steps = 20000"));
 }
 
 #[test]
 fn adaptive_metropolis() {
-    all(&PLAIN, ("adaptive_metropolis", "steps = 20000"));
+    all(&HALF, ("adaptive_metropolis", "steps = 20000"));
 }
 
 #[test]
 fn delayed_rejection_adaptive_metropolis() {
-    all(&PLAIN, ("delayed_rejection_adaptive_metropolis", "steps = 20000"));
+    all(&HALF, ("delayed_rejection_adaptive_metropolis", "steps = 20000"));
 }
 
 #[test]
 fn differential_evolution() {
-    all(&PLAIN, ("differential_evolution", "steps = 20000"));
+    all(&HALF, ("differential_evolution", "steps = 20000"));
 }
 
 #[test]
 fn sequential_monte_carlo() {
-    all(&HALF, ("sequential_monte_carlo", "particles = 2000"));
+    all(&QUARTER, ("sequential_monte_carlo", "particles = 2000"));
 }
 
 #[test]
@@ -162,13 +170,45 @@ fn variational() {
     all(&PLAIN, ("variational", ""));
 }
 
-/// `cargo test --workspace --test all -- --ignored every_posterior`
+/// Every target fulfils the contract and has its published quantities.
 #[test]
-#[ignore = "five samplers on twelve posteriors take some minutes"]
-fn every_posterior_with_the_samplers_that_take_longest() {
-    all(&PLAIN, ("no_u_turn", ""));
-    all(&PLAIN, ("hamiltonian", "warm_up = 500\nsteps = 1200"));
-    all(&PLAIN, ("affine_invariant_ensemble", "walkers = 60\nsteps = 4000"));
-    all(&PLAIN, ("nested", ""));
-    all(&PLAIN, ("sequential_monte_carlo", "particles = 2000"));
+fn the_posteriors_are_sound() {
+    let all = posteriordb::posteriors();
+    assert_eq!(all.len(), 15);
+    for posterior in &all {
+        let breaches =
+            lacuna_contract::density(posterior.name, &*posterior.density, &posterior.parameters);
+        assert_eq!(breaches, Ok(()));
+        let middle: Vec<f64> = posterior.parameters.iter().map(|p| p.prior.quantile(0.5)).collect();
+        assert!(posterior.reference.iter().all(|r| r.mean_error > 0.0 && r.mean_error < r.sd));
+        let names: Vec<&str> = posterior.reference.iter().map(|r| r.name.as_str()).collect();
+        assert_eq!(
+            (posterior.reported)(&middle).len(),
+            names.len(),
+            "{}: {names:?}",
+            posterior.name
+        );
+    }
+}
+
+/// At the published means the density is much larger than ten standard deviations to either side in any coordinate.
+#[test]
+fn the_published_means_have_a_high_density() {
+    for posterior in posteriordb::posteriors() {
+        if posterior.name.starts_with("eight_schools") {
+            continue;
+        }
+        let bound = posterior.density.bind(&posterior.parameters).unwrap();
+        let mean: Vec<f64> = posterior.reference.iter().map(|r| r.mean).collect();
+        let at = bound.gradient(&mean).0;
+        assert!(at.is_finite(), "{}", posterior.name);
+        for (j, figures) in posterior.reference.iter().enumerate() {
+            for side in [-10.0, 10.0] {
+                let mut moved = mean.clone();
+                moved[j] += side * figures.sd;
+                let away = bound.gradient(&moved).0;
+                assert!(away < at - 1.0, "{}, {}: {away} and {at}", posterior.name, figures.name);
+            }
+        }
+    }
 }
