@@ -81,7 +81,7 @@ fn each_replicate_has_runs_of_its_own_and_a_failed_run_counts_as_zero() {
     let whole = likelihood.log_estimate(&runs, &[]);
     let single = |rows: &[usize], replicate: usize| {
         let mut data = pairs();
-        data.replicates = vec![data.replicates[replicate].clone()];
+        data.replicates = vec![data.replicates[replicate].clone()].into();
         let text = format!("simulations = {}\nvariance = {{ known = 0.09 }}", rows.len());
         build(&text, &data).log_estimate(&runs.select_rows(rows), &[])
     };
