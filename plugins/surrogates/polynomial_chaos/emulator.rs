@@ -100,7 +100,7 @@ impl Header {
     /// components; `None` if they make no sense.
     fn sizes(&self) -> Option<[(usize, usize); 5]> {
         let (dimension, outputs) = (self.coordinates.len(), self.outputs);
-        if dimension == 0 || self.exponents.len() % dimension != 0 {
+        if dimension == 0 || !self.exponents.len().is_multiple_of(dimension) {
             return None;
         }
         let terms = self.exponents.len() / dimension;

@@ -40,16 +40,13 @@ impl Fits {
         let PrincipalComponents { mean, directions, scores, remainder, truncation } = components;
         let corrected = self.corrected(&scores);
         let few = remainder.is_none() || 2 * (scores.columns() + 1) < self.terms.terms().len();
-        let errors = match remainder {
-            Some(remainder) => {
-                let relative = relative_of_outputs(&corrected, variances, &directions, &remainder);
-                let residuals = added(remainder, &self.residuals, &directions);
-                Errors::OfOutputs(FitError { relative, residuals })
-            }
-            None => {
-                let sizes = (variances, &truncation[..]);
-                Errors::of_components(self.residuals, &corrected, &directions, sizes)
-            }
+        let errors = if let Some(remainder) = remainder {
+            let relative = relative_of_outputs(&corrected, variances, &directions, &remainder);
+            let residuals = added(remainder, &self.residuals, &directions);
+            Errors::OfOutputs(FitError { relative, residuals })
+        } else {
+            let sizes = (variances, &truncation[..]);
+            Errors::of_components(self.residuals, &corrected, &directions, sizes)
         };
         let total: f64 = variances.iter().sum();
         let reduction = Reduction {

@@ -77,7 +77,9 @@ mod tests {
             (0..500).map(|_| (0..outputs).map(|_| normal(&mut rng)).collect()).collect();
         for (most, left) in [(1000, 500), (40, outputs), (500, outputs)] {
             let mut directions = Directions::reduced_from(most, outputs);
-            all.iter().for_each(|row| directions.add(row));
+            for row in &all {
+                directions.add(row);
+            }
             let found: Vec<Vec<f64>> = directions.into_columns().collect();
             assert_eq!(found.len(), left);
             let (found, expected) = (covariance(&found, outputs), covariance(&all, outputs));
