@@ -109,7 +109,7 @@ AXES = {
     "outputs": [{"outputs": n} for n in (1000, 10_000, 100_000, 1_000_000)],
     "parameters": [{"parameters": n, "outputs": 100, "runs": 500, "walkers": max(120, 4 * n)} for n in (3, 10, 30, 100)],
     "walkers": [{"walkers": n, "outputs": 100} for n in (120, 1000, 10_000)],
-    "points": [{"replicates": n, "outputs": 100} for n in (20, 200, 2000, 20_000)],
+    "points": [{"replicates": n, "outputs": 100} for n in (200, 2000, 20_000, 200_000)],
 }
 SIZES = {"runs": "runs", "outputs": "outputs", "parameters": "parameters", "walkers": "walkers", "points": "replicates"}
 

@@ -226,9 +226,9 @@ impl Setting {
     }
 
     /// Outputs and values of the data with these indices, which increase.
-    pub fn values_at(&self, indices: &[usize]) -> impl Iterator<Item = (usize, f64)> {
+    pub fn values_at(&self, indices: &[usize]) -> Vec<(usize, f64)> {
         let places = self.places.get_or_init(|| Places::of(&self.data));
-        indices.iter().filter_map(|&index| places.value(&self.data, index))
+        places.values(&self.data, indices)
     }
 
     /// Like [`Setting::noisy`], about a response with randomly drawn common errors.

@@ -2,7 +2,8 @@
 
 use lacuna::data::Measurements;
 
-/// Index of the first value of each replicate, in the order by replicate and output without the missing ones.
+/// Index of the first value of each replicate, in the order by replicate and output without the missing ones, and the number
+/// of all values.
 #[derive(Debug, Clone)]
 pub struct Places {
     first: Vec<usize>,
@@ -11,32 +12,44 @@ pub struct Places {
 impl Places {
     /// Counts the values of the replicates.
     pub fn of(data: &Measurements) -> Self {
+        let mut first = vec![0];
         let mut next = 0;
-        let first = |values: &[Option<f64>]| {
-            let first = next;
-            next += values.iter().flatten().count();
-            first
-        };
-        let replicates = data.replicates.iter().map(|replicate| &replicate.values[..]);
-        Self { first: replicates.map(first).collect() }
+        for replicate in &data.replicates {
+            next += replicate.values.iter().flatten().count();
+            first.push(next);
+        }
+        Self { first }
     }
 
-    /// Output and value of an index; `None` if there are not as many.
-    pub fn value(&self, data: &Measurements, index: usize) -> Option<(usize, f64)> {
-        let replicate = self.first.partition_point(|&first| first <= index).checked_sub(1)?;
-        let values = &data.replicates[replicate].values;
-        let place = index - self.first[replicate];
-        let next = self.first.get(replicate + 1);
-        if next.is_some_and(|next| next - self.first[replicate] == values.len()) {
-            return Some((place, values[place]?));
+    /// Outputs and values of indices, which increase; those beyond the last value are omitted. A replicate is passed once.
+    pub fn values(&self, data: &Measurements, indices: &[usize]) -> Vec<(usize, f64)> {
+        let mut found = Vec::with_capacity(indices.len());
+        let mut rest = indices;
+        for (replicate, ends) in data.replicates.iter().zip(self.first.windows(2)) {
+            let (first, end) = (ends[0], ends[1]);
+            let count = rest.iter().take_while(|&&index| index < end).count();
+            let (own, others) = rest.split_at(count);
+            rest = others;
+            let present = replicate.values.iter().enumerate();
+            let mut present = present.filter_map(|(i, y)| Some((i, (*y)?)));
+            let is_complete = end - first == replicate.values.len();
+            let mut passed = first;
+            for &index in own {
+                if is_complete {
+                    let place = index - first;
+                    found.extend(replicate.values[place].map(|y| (place, y)));
+                } else {
+                    found.extend(present.nth(index - passed));
+                    passed = index + 1;
+                }
+            }
         }
-        values.iter().enumerate().filter_map(|(i, y)| Some((i, (*y)?))).nth(place)
+        found
     }
 }
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::discrepancies::common::{testing, values};
 
@@ -47,9 +60,13 @@ mod tests {
         data.replicates[3].values[1] = None;
         let places = Places::of(&data);
         let all: Vec<(usize, f64)> = values(&data).collect();
-        let found: Vec<(usize, f64)> =
-            (0..all.len()).map(|k| places.value(&data, k).unwrap()).collect();
-        assert_eq!(found, all);
-        assert_eq!(places.value(&data, all.len()), None);
+        let indices: Vec<usize> = (0..all.len() + 3).collect();
+        assert_eq!(places.values(&data, &indices), all);
+        for index in &indices[..all.len()] {
+            assert_eq!(places.values(&data, &[*index]), [all[*index]]);
+        }
+        let some: Vec<usize> = (0..all.len()).step_by(3).collect();
+        let expected: Vec<(usize, f64)> = some.iter().map(|&i| all[i]).collect();
+        assert_eq!(places.values(&data, &some), expected);
     }
 }

@@ -300,7 +300,7 @@ impl Likelihood for GaussianLikelihood {
             let all = self.left_out(response, hyper)?;
             return data.iter().map(|&i| all.get(i).copied()).collect();
         }
-        self.left_out_of_values(response, hyper, self.noise.setting.values_at(data))
+        self.left_out_of_values(response, hyper, self.noise.setting.values_at(data).into_iter())
     }
 
     fn is_cheap(&self) -> bool {
