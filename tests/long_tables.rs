@@ -13,7 +13,7 @@ const POINTS: usize = 100;
 
 /// Writes a study of a straight line with this number of replicates.
 fn study(folder: &Path, replicates: usize) {
-    let study = "[study]\nname = \"line\"\n\n[[parameter]]\nname = \"a\"\nprior = { uniform = [0, 1] }\n\n\
+    let study = "[study]\nname = \"line\"\ntitle = \"A line\"\nseed = 1\n\n[[parameter]]\nname = \"a\"\nprior = { uniform = [0, 1] }\n\n\
         [response]\nname = \"y\"\nunit = \"m\"\n\
         axes = { t = { first = 0.0, last = 99.0, count = 100, unit = \"s\" } }\n\n\
         [model]\nuse = \"equations\"\nwhere = { x = \"t / (1 {s})\" }\nobserve = \"a * x * (1 {m})\"\n\n\
