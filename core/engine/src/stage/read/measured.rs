@@ -25,7 +25,7 @@ const MANY: usize = 1_000_000;
 /// Number that stands for a value that was not measured: a NaN that no computation returns.
 const MISSING: u64 = 0x7ff8_4c61_6375_6e61;
 
-/// What is no number of many measurements.
+/// Everything of many measurements except their numbers.
 #[derive(Serialize, Deserialize)]
 struct Outline {
     blocks: Vec<Block>,
