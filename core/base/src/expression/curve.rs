@@ -113,7 +113,7 @@ impl Curve {
     fn after(&self, x: f64) -> usize {
         let (nodes, last) = (&self.nodes, self.nodes.len() - 1);
         let guess = ((x - nodes[0]) / (nodes[last] - nodes[0]) * last as f64) as usize;
-        for near in [guess, guess.saturating_sub(1), guess + 1] {
+        for near in [guess, guess.saturating_sub(1), guess.saturating_add(1)] {
             if near < last && nodes[near] <= x && x < nodes[near + 1] {
                 return near + 1;
             }
@@ -164,4 +164,20 @@ fn bends(nodes: &[f64], values: &[f64]) -> Vec<f64> {
     let begin = m[0] - (m[1] - m[0]) * first;
     let end = m[inner - 1] + (m[inner - 1] - m[inner - 2]) * last;
     std::iter::once(begin).chain(m).chain(std::iter::once(end)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The number of a segment far away is not one that has a next.
+    #[test]
+    fn far_beyond_its_ends_a_curve_is_constant() {
+        for interpolation in [Interpolation::Linear, Interpolation::Hold, Interpolation::Spline] {
+            let curve = Curve::new(vec![0.0, 1.0, 2.0], vec![3.0, 4.0, 7.0], interpolation);
+            for x in [1e300, f64::MAX, f64::INFINITY] {
+                assert_eq!((curve.height(x), curve.height(-x)), (7.0, 3.0), "{x}");
+            }
+        }
+    }
 }
