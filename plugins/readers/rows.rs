@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use csv::{ErrorKind, Reader, ReaderBuilder, Trim};
+use csv::{ErrorKind, Reader, ReaderBuilder, StringRecord, Trim};
 use lacuna::plugin::reader::ReadError;
 
 use super::faults::Faults;
@@ -50,13 +50,24 @@ impl<R: Read> Rows<R> {
         Ok((sheet, Self { reader, path: path.to_owned(), comma }, faults))
     }
 
+    /// Line in which the row begins that was read last. Its position is that of comments above it, if there are any.
+    fn line_of(&self, cells: &StringRecord) -> usize {
+        let begin = cells.position().map_or(0, |p| p.line() as usize);
+        let end = self.reader.position().line() as usize;
+        if end <= begin + 1 {
+            return begin;
+        }
+        let inside: usize = cells.iter().map(|cell| cell.matches('\n').count()).sum();
+        begin.max(end.saturating_sub(1 + inside))
+    }
+
     /// Reads the next row that can be read, and adds the errors of those before it; false at the end of the file.
     pub fn next(&mut self, record: &mut Record, faults: &mut Faults) -> bool {
         loop {
             match self.reader.read_record(&mut record.cells) {
                 Ok(false) => return false,
                 Ok(true) => {
-                    record.line = record.cells.position().map_or(0, |p| p.line() as usize);
+                    record.line = self.line_of(&record.cells);
                     return true;
                 }
                 Err(error) => {

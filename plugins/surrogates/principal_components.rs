@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use lacuna::run::Stop;
-use lacuna_linalg::{Matrix, wide};
+use lacuna_linalg::Matrix;
+use lacuna_linalg::wide::{self, Axes};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -38,13 +39,8 @@ pub struct PrincipalComponents {
 
 /// Number of values (runs times outputs) above which components are computed from the products of the runs.
 const LARGE: usize = 10_000_000;
-/// Singular values relative to the largest that these products resolve: the square root of the rounding error, and a
-/// margin.
-const RESOLVED: f64 = 1e-7;
 /// Number of runs whose kept part is in memory at a time.
 const BLOCK: usize = 64;
-/// Number of blocks of outputs computed together.
-const BLOCKS: usize = 16;
 
 impl Components {
     /// Returns a description of what is wrong with the choice, if anything.
@@ -99,15 +95,18 @@ impl Components {
 
     /// Computes the components from the products of the runs with each other, `C C'`, whose eigenvectors are the left
     /// singular vectors: for many more outputs than runs, with memory for one matrix of the size of the directions.
-    /// Components below [`RESOLVED`] of the largest are left to the remainder.
+    /// Components that the products do not resolve are left to the remainder.
     fn by_runs(
         &self,
         mean: Vec<f64>,
         centred: Matrix,
     ) -> Result<PrincipalComponents, lacuna_linalg::Error> {
         let products = lacuna_linalg::multiply_transposed(&centred, &centred);
-        let [scores, scaled] = scores(&products, |values| self.rank(values))?;
-        let directions = lacuna_linalg::transposed_multiply(&centred, &scaled);
+        let axes = Axes::of(&[products])?;
+        let kept: Vec<usize> = (0..self.rank(&axes.values)).collect();
+        let scores = axes.scores.select_columns(&kept);
+        let directions =
+            lacuna_linalg::transposed_multiply(&centred, &axes.inverse.select_columns(&kept));
         Ok(PrincipalComponents::without(centred, mean, directions, scores))
     }
 
@@ -137,45 +136,23 @@ fn failed(error: lacuna_linalg::Error) -> Stop {
     Stop::new(format!("the principal components of the outputs: {error}"))
 }
 
-/// Returns the scores `U S` (`runs x components`) from the products of the runs `U S^2 U'`, and `U S^-1`; `rank` chooses
-/// from the singular values that the products resolve.
-fn scores(
-    products: &Matrix,
-    rank: impl Fn(&[f64]) -> usize,
-) -> Result<[Matrix; 2], lacuna_linalg::Error> {
-    let runs = products.rows();
-    let eigen = lacuna_linalg::symmetric_eigen(products)?;
-    let mut values: Vec<f64> = eigen.values.iter().rev().map(|v| v.max(0.0).sqrt()).collect();
-    let largest = values.first().copied().unwrap_or(0.0);
-    values.retain(|s| *s > RESOLVED * largest);
-    let rank = rank(&values);
-    // The eigenvalues are in increasing order.
-    let scores = Matrix::from_fn(runs, rank, |i, k| eigen.vectors[(i, runs - 1 - k)] * values[k]);
-    let scaled = Matrix::from_fn(runs, rank, |i, k| scores[(i, k)] / (values[k] * values[k]));
-    Ok([scores, scaled])
-}
-
 /// Computes all components that the products of the runs resolve, without a matrix of the size of the responses.
 fn by_blocks(responses: &Matrix) -> Result<PrincipalComponents, Stop> {
-    let (runs, mean) = (responses.rows(), wide::column_means(responses));
+    let mean = wide::column_means(responses);
     let blocks = wide::blocks(mean.len());
     let product = |some: &[Range<usize>]| wide::products(responses, &mean, some);
-    let parts: Vec<Matrix> = blocks.par_chunks(BLOCKS).map(product).collect();
-    let mut products = Matrix::zeros(runs, runs);
-    for part in &parts {
-        products.as_mut_slice().iter_mut().zip(part.as_slice()).for_each(|(sum, x)| *sum += x);
-    }
-    let [scores, scaled] = scores(&products, <[f64]>::len).map_err(failed)?;
+    let parts: Vec<Matrix> = blocks.par_chunks(wide::TOGETHER).map(product).collect();
+    let Axes { scores, inverse, .. } = Axes::of(&parts).map_err(failed)?;
     let of_block = |own: &Range<usize>| {
         let centred = wide::centred(responses, &mean, own);
-        let directions = lacuna_linalg::transposed_multiply(&centred, &scaled);
+        let directions = lacuna_linalg::transposed_multiply(&centred, &inverse);
         let own = PrincipalComponents::without(centred, Vec::new(), directions, scores.clone());
         (own.directions, own.truncation)
     };
     let mut directions = Matrix::zeros(0, scores.columns());
     directions.reserve_rows(mean.len());
     let mut truncation = Vec::with_capacity(mean.len());
-    for some in blocks.chunks(BLOCKS) {
+    for some in blocks.chunks(wide::TOGETHER) {
         let found: Vec<_> = some.par_iter().map(of_block).collect();
         for (own, left) in found {
             own.iter_rows().for_each(|row| directions.push_row(row));

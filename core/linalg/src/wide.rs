@@ -2,10 +2,52 @@
 
 use std::ops::Range;
 
-use crate::{Matrix, multiply_transposed};
+use crate::{Error, Matrix, multiply_transposed, symmetric_eigen};
 
 /// Number of columns that are derived at a time.
 const BLOCK: usize = 8192;
+
+/// Number of blocks that are best derived together, on all processors.
+pub const TOGETHER: usize = 16;
+
+/// Singular values relative to the largest that the products of the rows resolve: the square root of the rounding error,
+/// and a margin.
+const RESOLVED: f64 = 1e-7;
+
+/// Axes of the rows: with the thin decomposition `A = U S Q'` the rows are `U S` in the axes `Q`, and `Q = A' U S^-1`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axes {
+    /// Singular values, decreasing; those that the products do not resolve are left out.
+    pub values: Vec<f64>,
+    /// `U S`, `m x axes`.
+    pub scores: Matrix,
+    /// `U S^-1`, `m x axes`.
+    pub inverse: Matrix,
+}
+
+impl Axes {
+    /// The axes from parts of the products `A A'`, which are added in their order.
+    ///
+    /// # Errors
+    /// If the products have no eigendecomposition.
+    pub fn of(parts: &[Matrix]) -> Result<Self, Error> {
+        let rows = parts.first().map_or(0, Matrix::rows);
+        let mut products = Matrix::zeros(rows, rows);
+        for part in parts {
+            products.as_mut_slice().iter_mut().zip(part.as_slice()).for_each(|(s, x)| *s += x);
+        }
+        let eigen = symmetric_eigen(&products)?;
+        // The eigenvalues are in increasing order.
+        let mut values: Vec<f64> = eigen.values.iter().rev().map(|v| v.max(0.0).sqrt()).collect();
+        let largest = values.first().copied().unwrap_or(0.0);
+        values.retain(|s| *s > RESOLVED * largest);
+        let size = values.len();
+        let scores =
+            Matrix::from_fn(rows, size, |i, k| eigen.vectors[(i, rows - 1 - k)] * values[k]);
+        let inverse = Matrix::from_fn(rows, size, |i, k| scores[(i, k)] / (values[k] * values[k]));
+        Ok(Self { values, scores, inverse })
+    }
+}
 
 /// Ranges of consecutive columns, whose boundaries depend on the number of columns alone.
 pub fn blocks(columns: usize) -> Vec<Range<usize>> {

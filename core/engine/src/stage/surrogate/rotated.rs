@@ -7,22 +7,16 @@
 use std::ops::Range;
 
 use lacuna::run::Stop;
-use lacuna_linalg::{Matrix, multiply, symmetric_eigen, wide};
+use lacuna_linalg::wide::{self, Axes};
+use lacuna_linalg::{Matrix, multiply, multiply_transposed};
 use rayon::prelude::*;
-
-/// Number of blocks of outputs computed together.
-const TOGETHER: usize = 16;
-
-/// Singular values relative to the largest that the products of the runs resolve: the square root of the rounding error,
-/// and a margin.
-const RESOLVED: f64 = 1e-7;
 
 /// Responses in the axes of the runs.
 pub struct Rotated {
     /// Scores `U S`, `runs x axes`.
     pub scores: Matrix,
-    /// `S^-1 U'`, `axes x runs`.
-    back: Matrix,
+    /// `U S^-1`, `runs x axes`.
+    inverse: Matrix,
     /// Mean of each output.
     mean: Vec<f64>,
 }
@@ -30,33 +24,21 @@ pub struct Rotated {
 impl Rotated {
     /// Rotates responses, `runs x outputs`.
     pub fn of(responses: &Matrix) -> Result<Self, Stop> {
-        let (runs, mean) = (responses.rows(), wide::column_means(responses));
+        let mean = wide::column_means(responses);
         let product = |blocks: &[Range<usize>]| wide::products(responses, &mean, blocks);
         let blocks = wide::blocks(mean.len());
-        let parts: Vec<Matrix> = blocks.par_chunks(TOGETHER).map(product).collect();
-        let mut products = Matrix::zeros(runs, runs);
-        for part in &parts {
-            products.as_mut_slice().iter_mut().zip(part.as_slice()).for_each(|(s, x)| *s += x);
-        }
-        let eigen = symmetric_eigen(&products)
+        let parts: Vec<Matrix> = blocks.par_chunks(wide::TOGETHER).map(product).collect();
+        let Axes { scores, inverse, .. } = Axes::of(&parts)
             .map_err(|e| Stop::new(format!("the products of the runs' responses: {e}")))?;
-        let values: Vec<f64> = eigen.values.iter().map(|v| v.max(0.0).sqrt()).collect();
-        let largest = values.last().copied().unwrap_or(0.0);
-        let axes: Vec<usize> =
-            (0..runs).rev().filter(|&k| values[k] > RESOLVED * largest).collect();
-        let scores =
-            Matrix::from_fn(runs, axes.len(), |i, k| eigen.vectors[(i, axes[k])] * values[axes[k]]);
-        let back =
-            Matrix::from_fn(axes.len(), runs, |k, i| eigen.vectors[(i, axes[k])] / values[axes[k]]);
-        Ok(Self { scores, back, mean })
+        Ok(Self { scores, inverse, mean })
     }
 
     /// Rotates differences in the axes of the runs (`any x axes`) back to the outputs of the same responses
     /// (`any x outputs`).
     pub fn to_outputs(&self, differences: &Matrix, responses: &Matrix) -> Matrix {
-        let weights = multiply(differences, &self.back);
+        let weights = multiply_transposed(differences, &self.inverse);
         let mut all = Matrix::zeros(weights.rows(), self.mean.len());
-        for some in wide::blocks(self.mean.len()).chunks(TOGETHER) {
+        for some in wide::blocks(self.mean.len()).chunks(wide::TOGETHER) {
             let block =
                 |own: &Range<usize>| multiply(&weights, &wide::centred(responses, &self.mean, own));
             let blocks: Vec<Matrix> = some.par_iter().map(block).collect();
