@@ -158,7 +158,7 @@ fn plant(
     Ok(kept.value)
 }
 
-/// Hands over the cases of [`power`], in a process that is asked for some of them, as a model.
+/// Hands over the cases of [`power()`], in a process that is asked for some of them, as a model.
 pub fn power_elsewhere(visit: &Visit, then: Then<'_>) -> Result<(), Stop> {
     let (study, mut run) = (&visit.study, visit.directory()?);
     if study.surrogate.is_some() {

@@ -1,7 +1,7 @@
 //! Posteriors of posteriordb (Magnusson et al., github.com/stan-dev/posteriordb, commit 28f8d3d) as targets.
 //!
 //! The log densities are those that posteriordb's Stan programs define, including priors, in natural units and so
-//! without the Jacobians of Stan's transformations; each is written once over [`Real`] numbers, and dual numbers give
+//! without the Jacobians of Stan's transformations; each is written once over `Real` numbers, and dual numbers give
 //! the gradient. Solutions of differential equations are differentiated step by step.
 //!
 //! They are a crate of their own because samplers spend nearly all of their time in these densities, and the tests are
