@@ -144,7 +144,7 @@ fn copied(
 ) -> Result<Emulated, Stop> {
     let (study, fitted) = (ground.study, learned.fitted.clone());
     let used = Used::of(study)?;
-    let emulator = used.widen(low_fidelity::load(study, &fitted.value.bytes)?);
+    let emulator = used.widen(low_fidelity::load(study, &fitted.value.bytes.bytes()?)?);
     Emulated::new(study, data, (fitted, emulator), learned.numerics.clone(), trial)
 }
 

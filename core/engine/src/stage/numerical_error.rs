@@ -112,7 +112,7 @@ impl NumericalError {
     pub fn error_samples(&self, section: &NumericalErrorSection) -> CommonError {
         let (errors, beyond) = self.unknown(section);
         let factor = joined(&over_root(&errors), &over_root(&beyond));
-        CommonError { origin: ErrorOrigin::Numerics, factor, predictive: true }
+        CommonError { origin: ErrorOrigin::Numerics, factor: factor.into(), predictive: true }
     }
 
     /// Curves of the unknown part, one per row; `whole` is the ratio of the whole error to a difference.
@@ -148,7 +148,7 @@ impl NumericalError {
         let whole = section.written.whole();
         let (scale, own_offset, emulated) = grouped::of_model(study, prediction);
         let model = study.trained();
-        let (mut sources, mut offset) = low_fidelity::sources(model, &fitted.bytes)?;
+        let (mut sources, mut offset) = low_fidelity::sources(model, &fitted.bytes.bytes()?)?;
         for (j, scale) in scale.iter().enumerate() {
             let own = 1.0 + whole * (scale - 1.0);
             for source in &mut sources {

@@ -4,6 +4,7 @@ mod figures;
 mod fitted;
 mod refits;
 mod rotated;
+mod serialised;
 
 use std::borrow::Cow;
 
@@ -16,7 +17,9 @@ use lacuna_run::{Folder, Kept, RunDirectory, Stage};
 use serde_json::json;
 
 use self::figures::{by_group, corrected, difference, inflation, mean, pairs, stacked};
+use self::fitted::EMULATOR;
 pub use self::fitted::{Errors, Fitted};
+use self::serialised::Serialised;
 use super::emulator_error::{self, Curves};
 use super::gradients::{self, Gradients};
 use super::idle::Used;
@@ -31,9 +34,9 @@ use crate::study::file::InvalidRuns;
 /// percent.
 const MOST_CURVES: usize = 5000;
 
-/// Number of values of error curves up to which as many are kept (512 MiB), and the number of curves that is kept however
+/// Number of values of error curves up to which as many are kept (256 MiB), and the number of curves that is kept however
 /// many outputs there are.
-const MOST_VALUES: usize = 1 << 26;
+const MOST_VALUES: usize = 1 << 25;
 const FEWEST_CURVES: usize = 50;
 
 /// Number of error curves that are kept.
@@ -174,11 +177,13 @@ pub fn stage(
     };
     let ensemble = data.value.runs()?;
     observer.begin(purpose.label(), "output", ensemble.layouts.len() as u64);
-    let kept = run.keep(&fitting.folder, &inputs, observer, |_| {
+    let mut kept = run.keep(&fitting.folder, &inputs, observer, |_| {
         let gradients = slopes.as_ref().map(|kept| &kept.value);
         fit(Fit { study, data: &data.value, fitting, used: &used, gradients }, observer)
     })?;
-    let emulator = used.widen(purpose.load(study, &kept.value.bytes)?);
+    let emulator = used.widen(purpose.load(study, &kept.value.bytes.bytes()?)?);
+    let file = run.stage_folder(&fitting.folder).join(EMULATOR);
+    kept.value.bytes = kept.value.bytes.kept_in(&file);
     let errors = &kept.value.errors;
     let unit = study.layouts.unit();
     observer
@@ -222,10 +227,31 @@ fn fit(fit: Fit<'_>, observer: &dyn Observer) -> Result<Fitted, Stop> {
     let emulated = emulator.mean(&test_points);
     let held_out = difference(&simulated, &emulated);
     let shown = emulator_error::thinned(points.rows(), most_curves(responses.columns()));
-    let left_out = corrected(&*emulator, &responses, &shown);
-    let judged = if held_out.rows() > 0 { &held_out } else { &left_out };
+    let runs = emulator_error::Runs { points: &points, responses: &responses };
+    let mut facts = emulator.facts();
+    let refitted = fit.refitted(runs, &shown).unwrap_or_else(|stop| {
+        let why = format!(
+            "by the leave-one-out formula, since a fit to nine tenths of the runs failed: {stop}"
+        );
+        facts.push(Fact::new("errors at runs left out", why));
+        None
+    });
+    let shown_points = points.select_rows(&shown);
+    let sample_points = stacked(shown_points.clone(), &test_points);
+    let left_out = || corrected(&*emulator, &responses, &shown);
+    let (own_samples, curves) = match refitted {
+        // Of large tables the errors of the refits stand for those of the formula too.
+        Some(curves) if runs.are_large() => (None, curves),
+        Some(curves) => (Some(left_out()), curves),
+        None => (None, Curves { points: shown_points, errors: left_out(), stated: None }),
+    };
+    let judged = if held_out.rows() > 0 {
+        &held_out
+    } else {
+        own_samples.as_ref().unwrap_or(&curves.errors)
+    };
     let loo_by_output = emulator.relative_error().to_vec();
-    let mut errors = Errors {
+    let errors = Errors {
         training: fitting.training.len(),
         validation: fitting.validation.len(),
         mae: mean(judged.as_slice().iter().map(|e| e.abs())),
@@ -235,30 +261,15 @@ fn fit(fit: Fit<'_>, observer: &dyn Observer) -> Result<Fitted, Stop> {
         loo_by_output,
         pairs: pairs(&simulated, &emulated),
         inflation: inflation(&*emulator, &test_points, &held_out),
-        facts: emulator.facts(),
+        facts,
     };
-    let runs = emulator_error::Runs { points: &points, responses: &responses };
-    let again = fit.refitted(runs, &shown);
-    let refitted = again.unwrap_or_else(|stop| {
-        let why = format!(
-            "by the leave-one-out formula, since a fit to nine tenths of the runs failed: {stop}"
-        );
-        errors.facts.push(Fact::new("errors at runs left out", why));
-        None
-    });
-    let shown_points = points.select_rows(&shown);
-    let curves = refitted.unwrap_or_else(|| Curves {
-        points: shown_points.clone(),
-        errors: left_out.clone(),
-        stated: None,
-    });
-    let samples = stacked(left_out, &held_out);
-    let sample_points = stacked(shown_points, &test_points);
+    let own_samples = own_samples.map(|samples| stacked(samples, &held_out));
     let stated = emulator.variance(&test_points);
     let validated = Curves { points: test_points, errors: held_out, stated };
     let curves = curves.with(validated);
     let active = fit.active(&responses);
-    Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points, curves, active })
+    let bytes = Serialised::Held(emulator.save()?);
+    Ok(Fitted { bytes, errors, own_samples, sample_points, curves, active })
 }
 
 /// Runs and settings to which an emulator of the study is fitted.

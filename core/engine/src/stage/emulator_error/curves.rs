@@ -38,6 +38,16 @@ pub struct Runs<'a> {
     pub responses: &'a Matrix,
 }
 
+/// Number of values (runs times outputs) above which a table is [large](Runs::are_large): 80 MB.
+const LARGE: usize = 10_000_000;
+
+impl Runs<'_> {
+    /// Returns true if copies of the responses, or of errors of as many values, are not made where it can be avoided.
+    pub fn are_large(&self) -> bool {
+        self.responses.rows() * self.responses.columns() > LARGE
+    }
+}
+
 impl Curves {
     /// Errors of emulators at training runs that were left out of the fit, by ten-fold cross-validation: principal
     /// components, terms and length scales are then chosen without the run, unlike in leave-one-out formulas. `fit`

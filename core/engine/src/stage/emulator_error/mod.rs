@@ -47,7 +47,7 @@ pub fn allowance(study: &Study, fitted: &Fitted, fit: Fit<'_>) -> Result<Allowan
 pub fn over_prior(study: &Study, fitted: &Fitted) -> Result<CommonError, Stop> {
     let curves = fitted.curves.near_prior(study);
     let factor = Places::of(&study.layouts).factor(&Scaled::plain(&curves.errors), &[])?;
-    Ok(CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true })
+    Ok(CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true })
 }
 
 /// Covariance of an error of which some curves are known, as two factors of low rank, `outputs x rank`: one enlarged by

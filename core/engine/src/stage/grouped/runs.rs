@@ -38,7 +38,7 @@ pub(super) fn fitted(study: &Study, trained: &Trained, own: Fitted) -> Fitted {
     };
     Fitted {
         errors,
-        samples: spread.curves(&own.samples),
+        own_samples: own.own_samples.as_ref().map(|samples| spread.curves(samples)),
         sample_points: points(study, trained, &own.sample_points),
         curves,
         bytes: own.bytes,

@@ -97,7 +97,7 @@ fn errors(
     let problem: Vec<(Vec<f64>, f64)> = fitted
         .sample_points
         .iter_rows()
-        .zip(fitted.samples.iter_rows())
+        .zip(fitted.samples().iter_rows())
         .map(|(point, errors)| {
             let squares: Vec<f64> = errors.iter().map(|e| e * e).collect();
             (unit(point), moments::mean(&squares))

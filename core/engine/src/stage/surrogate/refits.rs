@@ -3,16 +3,14 @@
 use lacuna::plugin::Surrogate;
 use lacuna::plugin::surrogate::Training;
 use lacuna::run::{Progress, Silent, Stop};
-use lacuna_linalg::Matrix;
 
 use super::rotated::Rotated;
 use super::{Fit, Purpose, plugin};
 use crate::stage::emulator_error::{Curves, Runs};
 use crate::stage::stream;
 
-/// Number of values (runs times outputs) above which refits use the axes of the runs, if there are more than
-/// [`TIMES`] as many outputs as runs.
-const LARGE: usize = 10_000_000;
+/// Refits of [large](Runs::are_large) tables use the axes of the runs if there are more than this many times as many
+/// outputs as runs.
 const TIMES: usize = 4;
 
 impl Fit<'_> {
@@ -23,7 +21,7 @@ impl Fit<'_> {
         if self.fitting.purpose != Purpose::Study {
             return Ok(None);
         }
-        let Some(surrogate) = self.rotating(responses)? else {
+        let Some(surrogate) = self.rotating(runs)? else {
             let all = Curves::refitted(runs, |kept, left| {
                 self.emulator(points, responses, kept, left, &Silent)
             })?;
@@ -56,10 +54,11 @@ impl Fit<'_> {
     }
 
     /// The surrogate for outputs in the axes of the runs, if there are many and its fit does not depend on the axes.
-    fn rotating(&self, responses: &Matrix) -> Result<Option<Box<dyn Surrogate>>, Stop> {
-        let (runs, outputs) = (responses.rows(), responses.columns());
+    fn rotating(&self, runs: Runs<'_>) -> Result<Option<Box<dyn Surrogate>>, Stop> {
+        let are_large = runs.are_large();
+        let (runs, outputs) = (runs.responses.rows(), runs.responses.columns());
         let alone = self.gradients.is_none() && self.data.cheaper.is_none();
-        if !alone || runs * outputs <= LARGE || outputs <= TIMES * runs {
+        if !alone || !are_large || outputs <= TIMES * runs {
             return Ok(None);
         }
         Ok(plugin(self.study)?.rotated(runs, outputs))
