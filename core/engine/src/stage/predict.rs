@@ -25,11 +25,16 @@ pub fn spaced(count: usize, draws: usize) -> Vec<usize> {
     (0..count).map(|k| (2 * k + 1) * draws / (2 * count)).collect()
 }
 
+/// Number of points whose responses are requested from the forward map at once.
+pub fn together(forward: &dyn Forward) -> usize {
+    (BATCH / forward.outputs().max(1)).max(1)
+}
+
 /// Response at each point; a point holds parameters, parameters of effects and hyperparameters in natural units, one
 /// per row.
 pub fn responses(study: &Study, forward: &dyn Forward, points: &Matrix) -> Vec<Vec<f64>> {
     let rows: Vec<usize> = (0..points.rows()).collect();
-    let batches = rows.chunks((BATCH / forward.outputs().max(1)).max(1));
+    let batches = rows.chunks(together(forward));
     batches.flat_map(|rows| batch(study, forward, &points.select_rows(rows))).collect()
 }
 

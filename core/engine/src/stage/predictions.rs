@@ -47,8 +47,9 @@ const WRITTEN: usize = 10_000_000;
 /// Largest number of response values held at once.
 const HELD: usize = 1 << 24;
 
-/// Number of draws processed together for long records.
+/// Number of draws processed together for long records, and for very long ones the number of values.
 const TOGETHER: usize = 40;
+const VALUES_TOGETHER: usize = 1 << 22;
 
 /// Selected draws of the posterior, chain by chain.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,6 +89,12 @@ fn number(draws: usize, data: usize) -> (usize, bool) {
     } else {
         (predict::affordable(fewest, data), false)
     }
+}
+
+/// Returns true if predictions of this many data are written, at draws of the posterior or of the prior.
+pub fn are_written(calibrated: &Calibrated, data: usize) -> bool {
+    let draws = calibrated.draws.from_step(calibrated.outcome.burn_in).len();
+    number(draws, data).1 || from_prior(data) > 0
 }
 
 /// Number of draws from the prior at which this many data are predicted; zero if even few draws give too many numbers
@@ -173,8 +180,9 @@ fn by_draw(
     let count = chosen.points.rows();
     let own = p.likelihood.hyperparameters().len();
     let mut all: Option<Matrix> = None;
-    for first in (0..count).step_by(TOGETHER) {
-        let rows: Vec<usize> = (first..count.min(first + TOGETHER)).collect();
+    let together = TOGETHER.min(VALUES_TOGETHER / p.forward.outputs().max(1)).max(1);
+    for first in (0..count).step_by(together) {
+        let rows: Vec<usize> = (first..count.min(first + together)).collect();
         let some = chosen.points.select_rows(&rows);
         let made;
         let at = if let Some(held) = responses {

@@ -1,5 +1,6 @@
 //! Stage 6: comparison of the calibrated model with the data, and of the emulator with the model.
 
+mod band;
 mod findings;
 
 use std::path::Path;
@@ -7,13 +8,12 @@ use std::path::Path;
 use lacuna::data::measurements::Summary;
 use lacuna::data::{Draws, Observations};
 use lacuna::math::moments;
-use lacuna::math::random::{Stream, normal};
+use lacuna::math::random::Stream;
 use lacuna::plugin::model::EvalError;
 use lacuna::plugin::{Emulator, Forward, Likelihood};
 use lacuna::run::{Observer, Progress, Stop, files};
 use lacuna_linalg::Matrix;
 use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -279,68 +279,6 @@ impl Work<'_> {
         }
         Prediction { band: Some(self.band(draws, likelihood, random)), spread }
     }
-
-    /// 95 % band of data simulated at posterior draws. For long records fewer draws are held, with several simulated
-    /// data sets at each.
-    fn band(
-        &self,
-        draws: &Draws,
-        likelihood: &dyn Likelihood,
-        random: &Stream,
-    ) -> (Vec<f64>, Vec<f64>) {
-        let outputs = self.study.layouts.len();
-        let wanted = PREDICTED.min(draws.len());
-        let count = predict::affordable(wanted, outputs);
-        let chosen = draws.points().select_rows(&predict::spaced(count, draws.len()));
-        let responses = predict::responses(self.study, self.forward, &chosen);
-        let d = chosen.columns() - likelihood.hyperparameters().len();
-        let several = wanted.div_ceil(count);
-        let mut noises: Vec<_> =
-            (0..count * several).map(|i| random.at(i as u64).generator()).collect();
-        let mut band = (Vec::with_capacity(outputs), Vec::with_capacity(outputs));
-        // Simulated data and their variances are held for a part of the outputs at a time, unless there are few.
-        let parts = if wanted * outputs > WHOLE { PARTS } else { 1 };
-        let outputs: Vec<usize> = (0..outputs).collect();
-        for part in outputs.chunks(outputs.len().div_ceil(parts).max(1)) {
-            let of_draw = |i: usize| -> Vec<f64> {
-                let hyper = &chosen.row(i)[d..];
-                let variance = total(&likelihood.predictive(&responses[i], hyper));
-                part.iter().map(|&j| variance.get(j).map_or(0.0, |v| v.sqrt())).collect()
-            };
-            let sds: Vec<Vec<f64>> = (0..count).into_par_iter().map(of_draw).collect();
-            let simulated: Vec<Vec<f64>> = noises
-                .par_iter_mut()
-                .enumerate()
-                .map(|(i, noise)| {
-                    let (response, sd) = (&responses[i % count], &sds[i % count]);
-                    let datum = |(&j, sd): (&usize, &f64)| response[j] + sd * normal(noise);
-                    part.iter().zip(sd).map(datum).collect()
-                })
-                .collect();
-            let ends = |j: usize| {
-                let mut values: Vec<f64> = simulated.iter().map(|r| r[j]).collect();
-                [0.025, 0.975].map(|p| moments::quantile_of(&mut values, p))
-            };
-            let ends: Vec<[f64; 2]> = (0..part.len()).into_par_iter().map(ends).collect();
-            band.0.extend(ends.iter().map(|end| end[0]));
-            band.1.extend(ends.iter().map(|end| end[1]));
-        }
-        band
-    }
-}
-
-/// Number of posterior draws for the predictive band.
-const PREDICTED: usize = 1000;
-
-/// Number of simulated values up to which all are held at once.
-const WHOLE: usize = 1 << 22;
-
-/// Number of parts into which the outputs of longer records are divided.
-const PARTS: usize = 16;
-
-fn total(parts: &[lacuna::plugin::discrepancy::VariancePart]) -> Vec<f64> {
-    let outputs = parts.first().map_or(0, |p| p.variance.len());
-    (0..outputs).map(|i| parts.iter().map(|p| p.variance[i]).sum()).collect()
 }
 
 /// Fraction of points inside the replicates' 95 % interval `mean +- 1.96 sd`, for each group (Radaideh et al., arXiv

@@ -112,7 +112,6 @@ fn simulated(judged: &Judged<'_>) -> Vec<Finding> {
     let outputs = judged.response.len();
     let count = predict::affordable(SIMULATED.min(draws.len()), outputs);
     let points = draws.points().select_rows(&predict::spaced(count, draws.len()));
-    let responses = judged.responses(&points);
     let random = stream(judged.study, "assess").named("simulate");
     let variance = judged.variance();
     let look = Look { judged, variance: &variance };
@@ -124,8 +123,8 @@ fn simulated(judged: &Judged<'_>) -> Vec<Finding> {
     let data = &judged.measured.likelihood;
     let values = data.count();
     let many = values > MANY && values > MANY_TIMES * outputs;
-    let one = |i: usize| {
-        let (response, hyper) = (&responses[i], judged.hyper(points.row(i)));
+    let one = |(i, response): (usize, &Vec<f64>)| {
+        let hyper = judged.hyper(points.row(i));
         let random: Stream = random.at(i as u64);
         let timed = correlated && i < CORRELATED;
         let summaries = (many && !timed)
@@ -140,7 +139,12 @@ fn simulated(judged: &Judged<'_>) -> Vec<Finding> {
         let all = data.summaries();
         (look.misfit(&all, response), time, look.against_scatter(&all, response))
     };
-    let made: Vec<(f64, Option<f64>, f64)> = (0..count).into_par_iter().map(one).collect();
+    let mut made: Vec<(f64, Option<f64>, f64)> = Vec::with_capacity(count);
+    let draws: Vec<usize> = (0..count).collect();
+    for some in draws.chunks(predict::together(judged.problem.forward())) {
+        let responses = judged.responses(&points.select_rows(some));
+        made.par_extend(some.par_iter().copied().zip(&responses).map(one));
+    }
     let misfits: Vec<f64> = made.iter().map(|m| m.0).filter(|m| m.is_finite()).collect();
     let times: Vec<f64> = made.iter().filter_map(|m| m.1).collect();
     let ratios: Vec<f64> = made.iter().map(|m| m.2).filter(|f| f.is_finite()).collect();

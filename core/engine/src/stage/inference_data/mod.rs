@@ -8,6 +8,7 @@ mod file;
 mod groups;
 mod predicted;
 
+use lacuna::data::Observations;
 use lacuna::run::{Stop, files};
 use lacuna_run::{Kept, RunDirectory, Stage};
 use serde::{Deserialize, Serialize};
@@ -16,7 +17,7 @@ use serde_json::json;
 use super::calibrate::{Calibrated, Law, Parts};
 use super::derived;
 use super::evidence::Weighed;
-use super::predictions::{Predicting, Predictor};
+use super::predictions::{self, Predicting, Predictor};
 use super::quantities::Quantified;
 use super::validate::Validated;
 use crate::posterior::Posterior;
@@ -64,16 +65,20 @@ pub fn stage(
     let Some(measured) = &problem.data.value.measured else { return Ok(()) };
     write(study, all, run, || {
         let parts = Parts::of(study, measured, problem)?;
-        let predictive = Parts::predicting(study, measured, problem)?;
         let posterior = parts.posterior(study, problem);
+        let data = &measured.likelihood;
+        if !predictions::are_written(&all.calibrated.value, data.count()) {
+            return encode(study, all, &posterior, Some(data), None);
+        }
+        let predictive = Parts::predicting(study, measured, problem)?;
         let predicting = Predicting {
             forward: problem.forward(),
             likelihood: parts.likelihood(),
             law: Law::of(study, measured, problem)?,
-            data: &measured.likelihood,
+            data,
         };
-        let makes = predictive.likelihood();
-        encode(study, all, &posterior, Some(&Predictor { densities: predicting, makes }))
+        let predictor = Predictor { densities: predicting, makes: predictive.likelihood() };
+        encode(study, all, &posterior, Some(data), Some(&predictor))
     })
 }
 
@@ -84,7 +89,7 @@ pub fn of_target(
     all: &Finished<'_>,
     run: &RunDirectory,
 ) -> Result<(), Stop> {
-    write(study, all, run, || encode(study, all, posterior, None))
+    write(study, all, run, || encode(study, all, posterior, None, None))
 }
 
 fn write(
@@ -122,11 +127,12 @@ fn write(
     files::write_json(&marker, &Marker { inputs, file: files::hash(&bytes) })
 }
 
-/// Bytes of the file.
+/// Bytes of the file, with predictions of the data if there is a `predictor`.
 fn encode(
     study: &Study,
     all: &Finished<'_>,
     posterior: &Posterior<'_>,
+    data: Option<&Observations>,
     predictor: Option<&Predictor<'_>>,
 ) -> Result<Vec<u8>, Stop> {
     let calibrated = &all.calibrated.value;
@@ -136,7 +142,7 @@ fn encode(
         weighed: all.weighed.map(|kept| &kept.value),
         validated: all.validated.map(|kept| &kept.value),
         quantities: all.quantities.map(|kept| &kept.value),
-        data: predictor.map(|p| p.densities.data),
+        data,
         from_posterior: match predictor {
             Some(p) => predicted::from_posterior(study, p, calibrated)?,
             None => None,
