@@ -13,6 +13,7 @@ mod subspace;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use lacuna_linalg::Matrix;
@@ -25,6 +26,9 @@ pub use self::subspace::{ActiveSubspace, active_subspace};
 pub const LEVEL: f64 = 0.05;
 /// Share of the largest mean absolute elementary effect below which an input counts as without effect.
 pub const SMALL: f64 = 0.05;
+
+/// Number of values (runs times outputs) that are judged: 80 MB.
+const MOST_VALUES: usize = 10_000_000;
 
 /// Smallest number of runs for a test of independence.
 const LEAST_RUNS: usize = 20;
@@ -48,7 +52,8 @@ pub fn screen(
     responses: &Matrix,
     blocks: impl Iterator<Item = Range<usize>>,
 ) -> Option<Screening> {
-    let scaled = scaled(responses, blocks)?;
+    let (responses, blocks) = few_outputs(responses, blocks, MOST_VALUES);
+    let scaled = scaled(&responses, blocks.into_iter())?;
     let effects = effects::elementary(positions, &scaled);
     let pairs: usize = effects.iter().map(|e| e.count).sum();
     // Trajectories have one pair per run, and as a rule a first run without one.
@@ -70,6 +75,26 @@ impl Screening {
             }
         }
     }
+}
+
+/// The responses and the blocks of their outputs; evenly spaced outputs stand for all if there are more than `most` values.
+fn few_outputs(
+    responses: &Matrix,
+    blocks: impl Iterator<Item = Range<usize>>,
+    most: usize,
+) -> (Cow<'_, Matrix>, Vec<Range<usize>>) {
+    let step = (responses.rows() * responses.columns()).div_ceil(most).max(1);
+    if step == 1 {
+        return (Cow::Borrowed(responses), blocks.collect());
+    }
+    let (mut columns, mut few) = (Vec::new(), Vec::new());
+    for block in blocks {
+        let first = columns.len();
+        columns.extend(block.step_by(step));
+        few.push(first..columns.len());
+    }
+    let rows: Vec<usize> = (0..responses.rows()).collect();
+    (Cow::Owned(responses.select(&rows, &columns)), few)
 }
 
 /// Divides the outputs of each block by its standard deviation over the runs, so that blocks of any unit count alike:

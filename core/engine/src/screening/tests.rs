@@ -5,7 +5,7 @@ use lacuna::math::random::{Stream, below, normal, permutation, uniform};
 use lacuna_linalg::Matrix;
 
 use super::criterion::dependences;
-use super::{ElementaryEffects, LEVEL, Screening, active_subspace, screen};
+use super::{ElementaryEffects, LEVEL, Screening, active_subspace, few_outputs, screen};
 
 fn cube(runs: usize, inputs: usize, stream: &Stream) -> Matrix {
     let mut rng = stream.generator();
@@ -218,4 +218,15 @@ fn eigenvalues_of_gradients_have_their_spread() {
     // The Monte Carlo error of a share of 0.92 in 300 cases is 0.016.
     let share = inside.map(|count| count as f64 / cases as f64);
     assert!(share.iter().all(|share| (0.87..=0.985).contains(share)), "{share:?}");
+}
+
+#[test]
+fn of_many_outputs_evenly_spaced_ones_of_each_block_are_judged() {
+    let responses = Matrix::from_fn(4, 1010, |i, j| (1000 * i + j) as f64);
+    let (some, blocks) = few_outputs(&responses, [0..1000, 1000..1010].into_iter(), 410);
+    assert_eq!(blocks, [0..100, 100..101]);
+    assert_eq!([some.rows(), some.columns()], [4, 101]);
+    assert_eq!([some[(2, 1)], some[(3, 99)], some[(0, 100)]], [2010.0, 3990.0, 1000.0]);
+    let (all, blocks) = few_outputs(&responses, [0..1000, 1000..1010].into_iter(), 4040);
+    assert_eq!((&*all, blocks), (&responses, vec![0..1000, 1000..1010]));
 }

@@ -209,7 +209,7 @@ fn invalid(study: &Study, ensemble: &Ensemble) -> Option<Finding> {
 }
 
 /// Largest number of values for which repeated fits use all outputs; beyond it a subset of the outputs is used.
-const MOST: usize = 20_000_000;
+const MOST: usize = 10_000_000;
 
 fn suspicious(
     study: &Study,
@@ -282,7 +282,7 @@ fn left_out(
         let errors = if some {
             emulator.left_out(runs, outputs)
         } else {
-            fitted.samples.select(runs, outputs)
+            fitted.samples().select(runs, outputs)
         };
         return LeftOut { errors, sizes: vec![1.0; runs.len()] };
     };
