@@ -141,7 +141,8 @@ fn likelihoods(
     data: &Measurements,
 ) -> [Option<Box<dyn Likelihood>>; 2] {
     let factor = Matrix::from_fn(OUTPUTS, 1, |i, _| 0.02 * (1.0 + i as f64));
-    let common = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
+    let common =
+        [CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true }];
     let slopes = || Ok(Matrix::from_fn(OUTPUTS, 2, |i, j| (0.4 * (i + 3 * j) as f64).sin()));
     let known = Known { data, common: &common, slopes: &slopes, parameters: &[] };
     let mut part = data.clone();

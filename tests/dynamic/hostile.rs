@@ -326,7 +326,7 @@ fn options_of_a_library_are_checked_by_its_schema() {
         lacuna_linalg::Matrix::from_fn(10, 2, |i, j| 0.1 * (1.0 + i as f64 - 2.0 * j as f64).cos());
     let common = [lacuna::plugin::discrepancy::CommonError {
         origin: lacuna::plugin::discrepancy::ErrorOrigin::Emulator,
-        factor,
+        factor: factor.into(),
         predictive: true,
     }];
     let of = |built: &Built<dyn Discrepancy>| {

@@ -75,7 +75,10 @@ pub fn emulator() -> &'static (Box<dyn Emulator>, CommonError) {
         let residuals = &emulator.fit_error().residuals;
         let scale = (RUNS as f64).sqrt();
         let factor = Matrix::from_fn(layouts.len(), RUNS, |i, r| residuals[(r, i)] / scale);
-        (emulator, CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true })
+        (
+            emulator,
+            CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true },
+        )
     })
 }
 

@@ -103,7 +103,8 @@ fn discrepancy(_: &str, discrepancy: &dyn Discrepancy, bits: &mut Bits) {
     let data = Measurements::new(layout(), (0..4).map(replicate).collect());
     let mut rng = Stream::root(8).generator();
     let factor = Matrix::from_fn(16, 2, |_, _| 0.05 * normal(&mut rng));
-    let common = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
+    let common =
+        [CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true }];
     let slopes = || Ok(Matrix::from_fn(16, 2, |i, j| (0.3 * i as f64 + j as f64).cos()));
     let parameters = parameters();
     let known = Known { data: &data, common: &common, slopes: &slopes, parameters: &parameters };

@@ -122,7 +122,7 @@ fn pattern() -> Measurements {
 fn likelihood(discrepancy: &dyn Discrepancy, data: &Measurements) -> Box<dyn Likelihood> {
     let emulator = CommonError {
         origin: ErrorOrigin::Emulator,
-        factor: Matrix::from_fn(OUTPUTS, 1, |i, _| 0.2 * (1.3 * i as f64).sin()),
+        factor: Matrix::from_fn(OUTPUTS, 1, |i, _| 0.2 * (1.3 * i as f64).sin()).into(),
         predictive: true,
     };
     let slopes = || Ok(Line::default().jacobian(&[]));

@@ -33,7 +33,8 @@ fn main() -> Fallible<()> {
     let word = arguments.next().unwrap_or_default();
     let data = data()?;
     let factor = random(OUTPUTS, rank, 0.1, 2);
-    let error = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
+    let error =
+        [CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true }];
     let slopes = || Ok(random(OUTPUTS, 3, 1.0, 3));
     let common = if rank > 0 { &error[..] } else { &[] };
     let known = Known { data: &data, common, slopes: &slopes, parameters: &[] };

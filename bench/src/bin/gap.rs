@@ -138,7 +138,10 @@ fn emulator(
     let residuals = &emulator.fit_error().residuals;
     let scale = (RUNS as f64).sqrt();
     let factor = Matrix::from_fn(layouts.len(), RUNS, |i, r| residuals[(r, i)] / scale);
-    Ok((emulator, CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }))
+    Ok((
+        emulator,
+        CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true },
+    ))
 }
 
 /// Replicates with autoregressive noise and an offset, for a truth with an echo on the fourth sensor.

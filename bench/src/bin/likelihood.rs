@@ -164,7 +164,8 @@ fn error(rank: usize) -> Vec<CommonError> {
     let mut rng = Stream::root(5).generator();
     let scale = 0.2 * NOISE / (rank.max(1) as f64).sqrt();
     let factor = Matrix::from_fn(OUTPUTS, rank, |_, _| scale * normal(&mut rng));
-    let error = CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true };
+    let error =
+        CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true };
     if rank == 0 { Vec::new() } else { vec![error] }
 }
 

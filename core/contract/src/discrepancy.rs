@@ -96,7 +96,7 @@ fn data() -> Measurements {
 fn common(origin: &str, predictive: bool) -> CommonError {
     let mut rng = Stream::root(8).named(origin).generator();
     let factor = Matrix::from_fn(OUTPUTS, 2, |_, _| 0.05 * normal(&mut rng));
-    CommonError { origin: origin.to_owned().into(), factor, predictive }
+    CommonError { origin: origin.to_owned().into(), factor: factor.into(), predictive }
 }
 
 /// Slopes for two parameters, of which the second has little influence.
@@ -287,7 +287,7 @@ fn refuses_bad_data(discrepancy: &dyn Discrepancy) -> Result<(), String> {
     let without_slopes = || discrepancy.likelihood(&Known::without_slopes(&sound, &[])).is_ok();
     calm("a model without slopes", without_slopes)?;
     let rank = |rows: usize, columns: usize| {
-        [CommonError { factor: Matrix::zeros(rows, columns), ..common("emulator", true) }]
+        [CommonError { factor: Matrix::zeros(rows, columns).into(), ..common("emulator", true) }]
     };
     refused("a common error of another shape", || {
         discrepancy.likelihood(&known(&data(), &rank(OUTPUTS - 1, 2))).map(|_| ())

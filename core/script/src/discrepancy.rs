@@ -78,7 +78,7 @@ impl Plugin {
         let sd = rows(if states { &data.replicates } else { &[] }, outputs, sd)?;
         let covariance = data.covariance.clone().unwrap_or_else(|| Matrix::zeros(0, outputs));
         let mut given = vec![&values, &sd, &covariance];
-        given.extend(known.common.iter().map(|error| &error.factor));
+        given.extend(known.common.iter().map(|error| &*error.factor));
         let names: Vec<&String> = data.replicates.iter().map(|replicate| &replicate.name).collect();
         let common: Vec<_> = known.common.iter().map(common).collect();
         let about = json!({ "layout": data.layout, "replicates": names, "common": common });

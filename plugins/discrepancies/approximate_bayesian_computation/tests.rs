@@ -92,7 +92,8 @@ fn it_has_its_derivatives() {
 fn the_likelihood_of_a_normal_number_has_its_closed_form() {
     const SIMULATIONS: f64 = 20_000.0;
     let factor = Matrix::from_fn(1, 1, |_, _| 0.4);
-    let error = CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true };
+    let error =
+        CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true };
     let text = "tolerance = { known = 0.3 }\nsimulations = 20000\nvariance = { half_normal = 1 }";
     let likelihood = build(text, &curve(&[1.0]), &[error]);
     let density = |x: f64, v: f64| (-0.5 * x * x / v).exp() / (TAU * v).sqrt();

@@ -49,7 +49,7 @@ pub fn random_matrix(rows: usize, columns: usize, seed: u64) -> Matrix {
 
 pub fn common(seed: u64) -> CommonError {
     let factor = random_matrix(OUTPUTS, 2, seed);
-    CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }
+    CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true }
 }
 
 /// All data as one normal vector: residuals, with replicate and output of each.

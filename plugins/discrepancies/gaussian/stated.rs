@@ -244,7 +244,7 @@ fn rotated(error: &CommonError, sets: &[Set]) -> CommonError {
         .collect();
     let rows = sets.last().map_or(0, |set| set.begin + set.outputs.len());
     let factor = Matrix::from_fn(rows, columns.len(), |i, k| columns[k][i]);
-    CommonError { factor, ..error.clone() }
+    CommonError { factor: factor.into(), ..error.clone() }
 }
 
 impl Likelihood for StatedLikelihood {

@@ -66,7 +66,7 @@ fn random_matrix(rows: usize, columns: usize, seed: u64) -> Matrix {
 
 fn common(seed: u64) -> CommonError {
     let factor = random_matrix(OUTPUTS, 2, seed);
-    CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }
+    CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true }
 }
 
 /// Builds the likelihood with these options.

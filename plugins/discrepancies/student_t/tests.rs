@@ -143,7 +143,8 @@ fn a_few_directions_do_what_the_whole_covariance_does() {
 fn no_error_has_no_weights() {
     let data = full(5, 3);
     let nothing = Matrix::zeros(OUTPUTS, 2);
-    let error = [CommonError { origin: ErrorOrigin::Emulator, factor: nothing, predictive: true }];
+    let error =
+        [CommonError { origin: ErrorOrigin::Emulator, factor: nothing.into(), predictive: true }];
     let likelihood = build("scale = { known = 1 }", &Known::without_slopes(&data, &error));
     assert_eq!(likelihood.hyperparameters().len(), 1);
     assert_eq!(likelihood.sampled_errors(&[4.0]), None);
@@ -184,7 +185,8 @@ fn new_data_have_the_whole_error() {
 /// noise of the mean curve.
 fn twelve_directions() -> (Measurements, Matrix, [CommonError; 1]) {
     let factor = random_matrix(OUTPUTS, 12, 12);
-    let error = CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true };
+    let error =
+        CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true };
     (full(5, 3), random_matrix(OUTPUTS, 2, 11), [error])
 }
 

@@ -75,7 +75,7 @@ fn fitted(parameters: &[Parameter], points: &Matrix, responses: &Matrix) -> Box<
 fn error(origin: &str, samples: &Matrix, size: f64) -> CommonError {
     let scale = size / (samples.rows() as f64).sqrt();
     let factor = Matrix::from_fn(OUTPUTS, samples.rows(), |i, r| scale * samples[(r, i)]);
-    CommonError { origin: origin.into(), factor, predictive: true }
+    CommonError { origin: origin.into(), factor: factor.into(), predictive: true }
 }
 
 fn difference(a: &Matrix, b: &Matrix) -> Matrix {

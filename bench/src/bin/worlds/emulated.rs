@@ -119,7 +119,8 @@ impl<W: World> Emulated<W> {
         near.truncate(NEAR);
         let scale = (NEAR as f64).sqrt();
         let factor = Matrix::from_fn(layouts.len(), NEAR, |i, k| residuals[(near[k], i)] / scale);
-        let error = CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true };
+        let error =
+            CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true };
         Ok(Self { world, name, layouts, parameters, emulator, error })
     }
 

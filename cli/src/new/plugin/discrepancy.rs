@@ -248,7 +248,11 @@ mod tests {
         let replicates = vec![replicate([1.0, 2.5]), replicate([1.4, 2.0])];
         let data = Measurements::new(layout, replicates);
         let factor = Matrix::from_vec(2, 1, vec![0.3, -0.2]);
-        let common = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
+        let common = [CommonError {
+            origin: ErrorOrigin::Emulator,
+            factor: factor.into(),
+            predictive: true,
+        }];
         let built = Skeleton::default().likelihood(&Known::without_slopes(&data, &common)).unwrap();
         let (e, f, s) = ([0.1, 0.6, 0.5, 0.1], [0.3, -0.2, 0.3, -0.2], 0.4);
         let [ee, ef, ff] = [dot(&e, &e), dot(&e, &f), dot(&f, &f)];

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use lacuna_base::data::measurements::Summary;
-use lacuna_base::data::{Layout, Measurements, Parameter, Unit};
+use lacuna_base::data::{Layout, Measurements, Parameter, Shared, Unit};
 use lacuna_base::math::distribution::Distribution;
 use lacuna_base::math::random::{Stream, normal};
 use lacuna_base::matrix::vector::dot;
@@ -171,7 +171,7 @@ pub struct CommonError {
     /// Origin of the error.
     pub origin: ErrorOrigin,
     /// Factor `F`, `outputs x rank`, in the response's unit.
-    pub factor: Matrix,
+    pub factor: Shared<Matrix>,
     /// True if a new replicate has this error too, in addition to what the discrepancy adds to a replicate.
     pub predictive: bool,
 }

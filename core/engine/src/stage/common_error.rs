@@ -15,7 +15,11 @@ pub struct Allowance {
 impl Allowance {
     /// Both sizes of an error that is common to all data; the factors are `outputs x rank`.
     pub fn new(origin: ErrorOrigin, [estimates, predictions]: [Matrix; 2]) -> Self {
-        let error = |factor| CommonError { origin: origin.clone(), factor, predictive: true };
+        let error = |factor: Matrix| CommonError {
+            origin: origin.clone(),
+            factor: factor.into(),
+            predictive: true,
+        };
         Self { estimates: error(estimates), predictions: error(predictions) }
     }
 }

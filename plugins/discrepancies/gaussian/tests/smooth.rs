@@ -138,7 +138,8 @@ fn common_errors_do_not_change_that() {
     for value in factor.as_mut_slice() {
         *value *= 1e-6;
     }
-    let common = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
+    let common =
+        [CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true }];
     let full = likelihood(&data, &common);
     let compressed = CompressedGaussian::new(&full, linear).unwrap();
     assert!(compressed.groups[0].squares.is_some());

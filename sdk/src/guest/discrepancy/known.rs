@@ -111,7 +111,7 @@ unsafe fn common(known: &table::Known) -> Result<Vec<CommonError>, Refusal> {
         let error = unsafe { &*known.common.add(i) };
         // SAFETY: as the caller promises.
         let (origin, factor) = unsafe { (error.origin.string().into(), error.factor.matrix()?) };
-        all.push(CommonError { origin, factor, predictive: error.predictive != 0 });
+        all.push(CommonError { origin, factor: factor.into(), predictive: error.predictive != 0 });
     }
     Ok(all)
 }

@@ -58,7 +58,7 @@ fn without_drift_the_statistics_have_their_law() {
         let mut experiment = world.experiment(&moved, 4, &stream);
         experiment.common = vec![CommonError {
             origin: ErrorOrigin::Numerics,
-            factor: smooth.clone(),
+            factor: smooth.clone().into(),
             predictive: true,
         }];
         let map = mapped(&experiment, &world.noise, LINEAR);

@@ -184,7 +184,7 @@ fn common(errors: &Matrix) -> CommonError {
     let factor = Matrix::from_fn(errors.columns(), errors.rows(), |i, k| errors[(k, i)] / scale);
     CommonError {
         origin: ErrorOrigin::Other("emulator of further inputs".to_owned()),
-        factor,
+        factor: factor.into(),
         predictive: true,
     }
 }

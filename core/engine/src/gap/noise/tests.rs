@@ -111,7 +111,8 @@ fn whitening_with_the_true_noise_gives_white_numbers() {
     let bump: Vec<f64> =
         (0..3 * LENGTH).map(|i| (-((i as f64 - 80.0) / 9.0).powi(2)).exp()).collect();
     let factor = Matrix::from_vec(3 * LENGTH, 1, bump.clone());
-    let common = CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true };
+    let common =
+        CommonError { origin: ErrorOrigin::Emulator, factor: factor.into(), predictive: true };
     experiment.common = vec![common];
     let noise = truth();
     let whitener = Whitener::new(&experiment, &noise, &forward.0);

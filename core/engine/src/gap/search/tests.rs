@@ -204,7 +204,7 @@ fn a_rotated_whitener_has_the_same_lengths() {
     let mut rng = Stream::root(4).generator();
     let factor = Matrix::from_fn(outputs, 5, |_, _| normal(&mut rng));
     let origin = ErrorOrigin::Emulator;
-    experiment.common.push(CommonError { origin, factor, predictive: true });
+    experiment.common.push(CommonError { origin, factor: factor.into(), predictive: true });
     let whiteners = [
         Whitener::new(&experiment, &world.noise, &truth),
         Whitener::rotated(&experiment, &world.noise, &truth),

@@ -62,7 +62,7 @@ pub fn error_covariance(
         let kept = (1.0 - weight).sqrt();
         let factor =
             Matrix::from_fn(error.factor.rows(), count, |i, k| kept * error.factor[(i, k)]);
-        all.common.push(CommonError { factor, ..error.clone() });
+        all.common.push(CommonError { factor: factor.into(), ..error.clone() });
         for ((sum, t), s) in all.independent.iter_mut().zip(&target).zip(&scale) {
             if *s > 0.0 {
                 *sum += weight * t / (s * s);
@@ -107,7 +107,7 @@ impl ErrorCovariance {
             origins,
             common: vec![CommonError {
                 origin: ErrorOrigin::from(origin),
-                factor,
+                factor: factor.into(),
                 predictive: true,
             }],
             independent,

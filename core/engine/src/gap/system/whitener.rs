@@ -244,7 +244,7 @@ pub fn condensed(experiment: &Experiment<'_>, noise: &Noise, response: &[f64]) -
         let kept: Vec<usize> =
             (0..eigen.values.len()).filter(|&k| eigen.values[k] > 0.01).collect();
         let factor = multiply(&error.factor, &eigen.vectors.select_columns(&kept));
-        CommonError { factor, ..error.clone() }
+        CommonError { factor: factor.into(), ..error.clone() }
     };
     experiment.common.iter().map(condense).collect()
 }

@@ -24,7 +24,7 @@ pub struct Law<'a> {
     replicates: Option<&'a Observations>,
     forward: &'a dyn Forward,
     plugin: &'a dyn Discrepancy,
-    common: Vec<CommonError>,
+    common: Vec<&'a CommonError>,
     /// Response at the best fit, if the error of the replicates' mean needs it.
     fitted: Option<Vec<f64>>,
     slopes: OnceLock<Result<Matrix, Stop>>,
@@ -35,7 +35,7 @@ impl<'a> Law<'a> {
     pub fn of(
         study: &'a Study,
         measured: &'a Measured,
-        problem: &InverseProblem<'a>,
+        problem: &'a InverseProblem<'_>,
     ) -> Result<Self, Stop> {
         Self::with(study, measured, problem, |error| &error.estimates)
     }
@@ -44,7 +44,7 @@ impl<'a> Law<'a> {
     pub fn predicting(
         study: &'a Study,
         measured: &'a Measured,
-        problem: &InverseProblem<'a>,
+        problem: &'a InverseProblem<'_>,
     ) -> Result<Self, Stop> {
         Self::with(study, measured, problem, |error| &error.predictions)
     }
@@ -52,13 +52,13 @@ impl<'a> Law<'a> {
     fn with(
         study: &'a Study,
         measured: &'a Measured,
-        problem: &InverseProblem<'a>,
+        problem: &'a InverseProblem<'_>,
         size: fn(&Allowance) -> &CommonError,
     ) -> Result<Self, Stop> {
         let section =
             study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
         let errors = problem.allowances(study, &section.common, &measured.likelihood)?;
-        let common = errors.iter().map(|error| size(error).clone()).collect();
+        let common = errors.iter().map(size).collect();
         // Replicates of a stochastic model scatter about no common curve.
         let stochastic = problem.forward().is_stochastic();
         let included = section.common.replicate_error && !stochastic;
@@ -97,7 +97,7 @@ impl<'a> Law<'a> {
     }
 
     /// Common errors of all blocks together, without that of the replicates' mean.
-    pub fn common(&self) -> &[CommonError] {
+    pub fn common(&self) -> &[&'a CommonError] {
         &self.common
     }
 
@@ -123,11 +123,13 @@ impl<'a> Law<'a> {
         make: impl FnOnce(&discrepancy::Known<'_>) -> Result<T, Stop>,
     ) -> Result<T, Stop> {
         let range = self.study.layouts.ranges().nth(i).unwrap_or_default();
-        let part = |error: &CommonError| CommonError {
-            factor: rows(&error.factor, range.clone()),
-            ..error.clone()
+        let part = |mut error: CommonError| {
+            if range.len() < error.factor.rows() {
+                error.factor = rows(&error.factor, range.clone()).into();
+            }
+            error
         };
-        let mut own: Vec<CommonError> = self.common.iter().map(part).collect();
+        let mut own: Vec<CommonError> = self.common.iter().copied().cloned().map(part).collect();
         // A stated covariance already contains the correlation within a replicate.
         let shared = |replicates: &&Observations| replicates.blocks[i].covariance.is_none();
         if let Some(replicates) = self.replicates.filter(shared) {

@@ -6,6 +6,7 @@ mod variables;
 
 use std::ops::Range;
 
+use lacuna::data::Shared;
 use lacuna::math::random::Stream;
 use lacuna::plugin::Likelihood;
 use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, ErrorPath};
@@ -56,8 +57,8 @@ impl Errors {
         let alone = Parts::bare(study, &measured.likelihood, problem.forward())?;
         let unknowns = |parts: &Parts| parts.likelihood().hyperparameters().len();
         let (count, own) = (unknowns(&whole), unknowns(&alone));
-        let common: Vec<CommonError> =
-            law.common().iter().filter(|error| error.predictive).cloned().collect();
+        let all = law.common().iter().copied();
+        let common: Vec<CommonError> = all.filter(|error| error.predictive).cloned().collect();
         let mut predictive = Vec::new();
         let mut columns = 0..0;
         for error in &common {
@@ -166,7 +167,7 @@ fn drawn(common: &[CommonError], stream: &Stream) -> impl Iterator<Item = ErrorP
 /// Factor of all common errors side by side, `outputs x weights`: those of all blocks together, then the errors of the mean
 /// of the replicates, which are independent between blocks.
 fn factor_of_all(study: &Study, law: &Law<'_>, common: &[CommonError]) -> Result<Matrix, Stop> {
-    let mut parts: Vec<(usize, Matrix)> =
+    let mut parts: Vec<(usize, Shared<Matrix>)> =
         common.iter().map(|error| (0, error.factor.clone())).collect();
     for (b, outputs) in study.layouts.ranges().enumerate() {
         let own = law.errors(b)?.into_iter().filter(|error| !error.predictive);

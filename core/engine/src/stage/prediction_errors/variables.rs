@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     fn error(origin: ErrorOrigin, rows: [[f64; 2]; 3]) -> CommonError {
-        CommonError { origin, factor: Matrix::from_rows(2, rows), predictive: true }
+        CommonError { origin, factor: Matrix::from_rows(2, rows).into(), predictive: true }
     }
 
     /// The covariance of all errors together is that of their factors, because independent errors stay independent.

@@ -68,7 +68,7 @@ pub fn of_replicates(data: &Measurements, response: Option<&[f64]>) -> Option<Co
     }
     columns.extend(directions.into_columns());
     let factor = Matrix::from_fn(data.layout.len(), columns.len(), |i, k| columns[k][i]);
-    Some(CommonError { origin: ErrorOrigin::Replicates, factor, predictive: false })
+    Some(CommonError { origin: ErrorOrigin::Replicates, factor: factor.into(), predictive: false })
 }
 
 /// Deviation of a replicate from the mean, where at least two replicates have a value.

@@ -135,7 +135,9 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     ];
     let truth = curve(1.0);
     for (k, pulses) in cases.iter().enumerate() {
-        let held = coverage(pulses, |data| of_replicates(data, Some(&truth)).unwrap().factor);
+        let held = coverage(pulses, |data| {
+            Matrix::clone(&of_replicates(data, Some(&truth)).unwrap().factor)
+        });
         // 95 % minus three standard errors of 200 data sets.
         assert!(held.iter().all(|h| *h > 0.90), "case {k}: {held:?}");
     }
@@ -155,7 +157,8 @@ fn a_model_of_a_wrong_form_is_better_than_none() {
     };
     let all = (0..GAUGES).flat_map(|g| (0..TIMES).map(move |t| wrong(g, 0.5 * t as f64)));
     let wrong: Vec<f64> = all.collect();
-    let held = coverage(&pulses, |data| of_replicates(data, Some(&wrong)).unwrap().factor);
+    let held =
+        coverage(&pulses, |data| Matrix::clone(&of_replicates(data, Some(&wrong)).unwrap().factor));
     let before = coverage(&pulses, sampled);
     // Three standard errors of the difference of two shares of 200 data sets.
     assert!(
@@ -281,7 +284,9 @@ fn the_table_of_the_guide() {
         let slopes = Matrix::from_fn(truth.len(), unknowns, slope);
         for count in [3, 5, 20] {
             let none = |_: &Measurements| Matrix::zeros(truth.len(), 1);
-            let now = |data: &Measurements| of_replicates(data, Some(&truth)).unwrap().factor;
+            let now = |data: &Measurements| {
+                Matrix::clone(&of_replicates(data, Some(&truth)).unwrap().factor)
+            };
             let methods: [(&str, Method<'_>); 3] =
                 [("none", &none), ("sampled", &sampled), ("gain, timing, offset", &now)];
             for (name, error) in methods {

@@ -181,7 +181,11 @@ impl Remainder {
         let count = self.variances[length].iter().take_while(matters).count();
         let rows = &self.factors[length];
         let factor = Matrix::from_fn(rows.columns(), count, |i, k| size * rows[(k, i)]);
-        CommonError { origin: ErrorOrigin::from("remainder".to_owned()), factor, predictive: true }
+        CommonError {
+            origin: ErrorOrigin::from("remainder".to_owned()),
+            factor: factor.into(),
+            predictive: true,
+        }
     }
 
     /// The posterior mean of the remainder of a setting at each output, in the response's unit, for the fit of a
