@@ -1,9 +1,11 @@
 //! Singular value decomposition.
 
+use faer::MatRef;
+
 use crate::Matrix;
 use crate::eigen::{column_signs, scale_column};
 use crate::error::{Error, finite};
-use crate::faer_view::{copied, on_one_thread, view};
+use crate::faer_view::{on_one_thread, view};
 
 /// `A = U diag(values) V'` with `A` `m x n`, `U` `m x k` and `V` `n x k` with orthonormal columns,
 /// `k = min(m, n)`.
@@ -28,8 +30,9 @@ pub fn thin_svd(a: &Matrix) -> Result<Svd, Error> {
     let mut order: Vec<usize> = (0..found.len()).collect();
     order.sort_by(|&i, &j| found[j].total_cmp(&found[i]));
     let values = order.iter().map(|&i| found[i]).collect();
-    let (mut u, mut v) =
-        (copied(svd.U()).select_columns(&order), copied(svd.V()).select_columns(&order));
+    let ordered =
+        |all: MatRef<'_, f64>| Matrix::from_fn(all.nrows(), order.len(), |i, j| all[(i, order[j])]);
+    let (mut u, mut v) = (ordered(svd.U()), ordered(svd.V()));
     for (j, sign) in column_signs(&v).into_iter().enumerate() {
         scale_column(&mut u, j, sign);
         scale_column(&mut v, j, sign);

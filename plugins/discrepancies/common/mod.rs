@@ -4,6 +4,7 @@
 mod biased;
 mod correlation;
 mod dense;
+mod directions;
 mod groups;
 mod noise;
 mod normal;
@@ -17,6 +18,7 @@ mod unknown;
 pub use biased::{Bias, Biased, normal_draw};
 pub use correlation::{Correlation, Functional};
 pub use dense::{Dense, DenseSolved};
+pub use directions::{WeightedDirections, WeightedFactor};
 pub use groups::{AxisWindows, By, Division, Groups};
 pub use noise::{Noise, Setting, part, start};
 pub use normal::{Normal, conditional, values};

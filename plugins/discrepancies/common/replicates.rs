@@ -5,6 +5,8 @@ use lacuna::plugin::discrepancy::CommonError;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
+use super::directions::{WeightedDirections, WeightedFactor};
+
 /// Statistics of the outputs that were measured at least once.
 #[derive(Debug, Clone)]
 pub struct Replicates {
@@ -54,22 +56,12 @@ impl Replicates {
     /// Returns the factor of all common errors at the measured outputs, with as many columns as its rank, by a
     /// singular value decomposition weighted with the roots of the counts.
     pub fn common_factor(&self, common: &[CommonError]) -> Result<Matrix, Stop> {
-        let columns: Vec<(&Matrix, usize)> = common
-            .iter()
-            .flat_map(|error| (0..error.factor.columns()).map(move |k| (&error.factor, k)))
-            .collect();
-        let rows = self.measured.len();
-        if columns.is_empty() {
-            return Ok(Matrix::zeros(rows, 0));
-        }
-        let weighted = Matrix::from_fn(rows, columns.len(), |i, k| {
-            let (factor, column) = columns[k];
-            self.count[i].sqrt() * factor[(self.measured[i], column)]
-        });
-        let svd = lacuna_linalg::thin_svd(&weighted)
-            .map_err(|e| Stop::new(format!("the covariance of the common errors: {e}")))?;
-        let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
-        Ok(Matrix::from_fn(rows, rank, |i, k| svd.u[(i, k)] * svd.values[k] / self.count[i].sqrt()))
+        let weight: Vec<f64> = self.count.iter().map(|n| n.sqrt()).collect();
+        let WeightedDirections { rows, values } =
+            WeightedFactor::of(common, &self.measured, &weight).directions()?;
+        Ok(Matrix::from_fn(self.measured.len(), values.len(), |i, k| {
+            rows[(k, i)] * values[k] / weight[i]
+        }))
     }
 }
 

@@ -62,7 +62,10 @@ impl CompressedGroup {
         for (entry, part) in b.as_mut_slice().iter_mut().zip(explained.as_slice()) {
             *entry -= part;
         }
-        let r = lacuna_linalg::thin_qr(&b)?.r;
+        // Of a million outputs each of these matrices takes hundreds of megabytes.
+        drop(explained);
+        let r = lacuna_linalg::triangular_factor(&b)?;
+        drop(b);
         // The last entry of a square `R` is the distance of the data from the span of the basis.
         let distance = if r.rows() > terms { r[(terms, terms)] } else { 0.0 };
         let least = s.spread.scatter + distance * distance;

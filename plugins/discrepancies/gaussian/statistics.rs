@@ -18,7 +18,7 @@ use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 use lacuna_linalg::vector::dot;
 
-use crate::discrepancies::common::Replicates;
+use crate::discrepancies::common::{Replicates, WeightedDirections, WeightedFactor};
 
 /// Statistics of the data of one group and of the common errors.
 #[derive(Debug, Clone)]
@@ -189,30 +189,14 @@ impl Statistics {
 
     /// Returns the factor of the common errors as it enters the residual (`measured x columns`).
     pub fn weighted(&self, common: &[CommonError]) -> Matrix {
-        let columns: Vec<(&Matrix, usize)> = common
-            .iter()
-            .flat_map(|error| (0..error.factor.columns()).map(move |k| (&error.factor, k)))
-            .collect();
-        Matrix::from_fn(self.measured.len(), columns.len(), |i, k| {
-            let (factor, column) = columns[k];
-            self.weight[i] * factor[(self.measured[i], column)]
-        })
+        WeightedFactor::of(common, &self.measured, &self.weight).whole()
     }
 
     /// Returns eigenvectors and eigenvalues of the covariance `K` of all common errors.
     pub fn common_directions(&self, common: &[CommonError]) -> Result<Directions, Stop> {
-        let weighted = self.weighted(common);
-        if weighted.columns() == 0 {
-            return Ok(Directions::none(self.measured.len()));
-        }
-        let svd = lacuna_linalg::thin_svd(&weighted)
-            .map_err(|e| Stop::new(format!("the covariance of the common errors: {e}")))?;
-        let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
-        let kept: Vec<usize> = (0..rank).collect();
-        Ok(Directions {
-            rows: svd.u.select_columns(&kept).transposed(),
-            eigenvalues: svd.values[..rank].iter().map(|s| s * s).collect(),
-        })
+        let WeightedDirections { rows, values } =
+            WeightedFactor::of(common, &self.measured, &self.weight).directions()?;
+        Ok(Directions { rows, eigenvalues: values.iter().map(|s| s * s).collect() })
     }
 
     /// Returns the residual of each response along the directions of the common errors, and the remaining vector. A
