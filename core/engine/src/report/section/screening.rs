@@ -79,7 +79,7 @@ fn screened(ensemble: &EnsembleFindings, numbers: &mut Numbers) -> Markup {
             let caption = Caption::new(
                 "Dependence of the response on each input, from the runs alone: normalised Hilbert-Schmidt \
                  independence criterion, and the probability of at least this dependence without an effect.",
-                "inputs over the design, and all outputs together.",
+                "inputs over the design, and all outputs together (of more than ten million values evenly spaced outputs).",
                 "a large p: the runs show no effect of that input. Of the inputs without effect, one in twenty \
                  has a p below 0.05.",
             );
@@ -94,7 +94,7 @@ fn screened(ensemble: &EnsembleFindings, numbers: &mut Numbers) -> Markup {
             let caption = Caption::new(
                 "Elementary effects of each input: change of the response over the range of the input, in standard \
                  deviations of the response over the runs; mean absolute effect (mu*) and standard deviation (sigma).",
-                "inputs over the design, and all outputs together.",
+                "inputs over the design, and all outputs together (of more than ten million values evenly spaced outputs).",
                 "a mu* far below the others: the input hardly matters. A sigma as large as mu*: it acts \
                  nonlinearly or together with others.",
             );
