@@ -35,7 +35,7 @@ const ARROWS: [(&str, &[&str]); 13] = [
             "lacuna-script",
         ],
     ),
-    ("core/contract", &["lacuna", "lacuna-linalg", "lacuna-run"]),
+    ("core/contract", &["lacuna", "lacuna-run"]),
     ("sdk", &["lacuna", "lacuna-abi", "lacuna-linalg"]),
     ("um_bridge", &[]),
     ("plugins", &["lacuna", "lacuna-linalg", "lacuna-optimise", "lacuna-run", "lacuna-um-bridge"]),

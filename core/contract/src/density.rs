@@ -2,9 +2,9 @@
 
 use lacuna::data::Parameter;
 use lacuna::math::random::Stream;
+use lacuna::matrix::Matrix;
 use lacuna::plugin::Density;
 use lacuna::plugin::density::BoundDensity;
-use lacuna_linalg::Matrix;
 
 use crate::judge::{Check, calm, judge, same_on_threads, slope};
 

@@ -3,8 +3,8 @@
 use lacuna::data::Parameter;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
+use lacuna::matrix::Matrix;
 use lacuna::plugin::Design;
-use lacuna_linalg::Matrix;
 
 use crate::judge::{Check, calm, judge, same_on_threads};
 

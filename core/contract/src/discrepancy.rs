@@ -8,11 +8,11 @@ use std::sync::OnceLock;
 use lacuna::data::{Measurements, Parameter, Replicate};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
+use lacuna::matrix::{Matrix, multiply_vector, transposed_multiply_vector};
 use lacuna::plugin::Discrepancy;
 use lacuna::plugin::discrepancy::{CommonError, Known, Likelihood};
 use lacuna::plugin::forward::Linear;
 use lacuna::run::Stop;
-use lacuna_linalg::Matrix;
 
 use self::draws::{
     draws_errors_given_the_data, draws_the_errors_it_predicts, has_the_law_that_it_simulates,
@@ -253,15 +253,16 @@ fn compresses_exactly(likelihood: &dyn Likelihood) -> Result<(), String> {
     let start = start(likelihood);
     let basis = Matrix::from_fn(6, 4, |_, _| normal(&mut rng));
     let hyper = Matrix::from_fn(6, start.len(), |i, j| start[j] * (1.0 + 0.1 * i as f64));
-    let responses = lacuna_linalg::multiply(&basis, &terms.0);
+    let rows = basis.iter_rows().map(|row| transposed_multiply_vector(&terms.0, row));
+    let responses = Matrix::from_rows(OUTPUTS, rows);
     let full: Vec<f64> =
         (0..6).map(|i| likelihood.log_likelihood(responses.row(i), hyper.row(i))).collect();
     agree("the reduced value of point", &compressed.log_likelihood(&basis, &hyper), &full, 1e-9)?;
     for i in 0..6 {
         let (by_basis, by_hyper) = compressed.gradient(basis.row(i), hyper.row(i));
         let (by_response, expected) = likelihood.gradient(responses.row(i), hyper.row(i));
-        let chained = lacuna_linalg::multiply(&terms.0, &Matrix::from_vec(OUTPUTS, 1, by_response));
-        agree("the reduced derivative by term", &by_basis, chained.as_slice(), 1e-8)?;
+        let chained = multiply_vector(&terms.0, &by_response);
+        agree("the reduced derivative by term", &by_basis, &chained, 1e-8)?;
         agree("the reduced derivative by hyperparameter", &by_hyper, &expected, 1e-8)?;
     }
     Ok(())

@@ -1,9 +1,9 @@
 //! Contract of effects.
 
 use lacuna::math::random::{Stream, normal};
+use lacuna::matrix::Matrix;
 use lacuna::plugin::Effect;
 use lacuna::plugin::effect::Situation;
-use lacuna_linalg::Matrix;
 
 use crate::judge::{Check, agree, judge, layout, slope, twice};
 

@@ -220,3 +220,31 @@ fn bears_an_empty_batch(executor: &dyn Executor, scratch: &Path) -> Result<(), S
     result.map_err(|stop| format!("it stops: {stop}"))?;
     if handed.is_empty() { Ok(()) } else { Err("jobs that nobody asked for".into()) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An executor that runs nothing.
+    struct Idle;
+
+    impl Component for Idle {}
+
+    impl Executor for Idle {
+        fn submit(
+            &self,
+            _: &Batch<'_>,
+            _: &mut dyn FnMut(Finished) -> Result<(), Stop>,
+        ) -> Result<(), Stop> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn an_idle_executor_is_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let breaches = executor("idle", &Idle, folder.path()).unwrap_err();
+        assert_eq!(breaches.len(), 4, "{breaches:?}");
+        assert!(breaches[0].ends_with("job 0 is not handed over"), "{breaches:?}");
+    }
+}

@@ -6,6 +6,7 @@ mod density;
 mod design;
 mod discrepancy;
 mod effect;
+#[cfg(feature = "executor")]
 mod executor;
 mod judge;
 mod model;
@@ -20,6 +21,7 @@ pub use density::density;
 pub use design::design;
 pub use discrepancy::discrepancy;
 pub use effect::effect;
+#[cfg(feature = "executor")]
 pub use executor::{LINE, Line, executor};
 pub use model::model;
 pub use quantity::quantity;

@@ -5,11 +5,11 @@ mod axes;
 use lacuna::data::{Layouts, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
+use lacuna::matrix::vector::dot;
+use lacuna::matrix::{Matrix, transposed_multiply_vector};
 use lacuna::plugin::forward::Linear;
 use lacuna::plugin::surrogate::{Emulator, Indices, Summand, Surrogate, Training};
 use lacuna::run::{Progress, Silent};
-use lacuna_linalg::Matrix;
-use lacuna_linalg::vector::dot;
 
 use crate::judge::{Check, agree, calm, judge, layout, refused, same_on_threads, slope};
 
@@ -207,9 +207,11 @@ fn knows_its_derivatives(surrogate: &dyn Surrogate, problem: &Problem) -> Result
         }
     }
     if let Some(linear) = emulator.linear() {
-        let product = lacuna_linalg::multiply(&linear.basis(&problem.fresh), linear.coefficients());
-        let mean = emulator.mean(&problem.fresh);
-        agree("basis times coefficients, entry", product.as_slice(), mean.as_slice(), 1e-11)?;
+        let (basis, mean) = (linear.basis(&problem.fresh), emulator.mean(&problem.fresh));
+        for (terms, mean) in basis.iter_rows().zip(mean.iter_rows()) {
+            let product = transposed_multiply_vector(linear.coefficients(), terms);
+            agree("basis times coefficients, entry", &product, mean, 1e-11)?;
+        }
         sums_squares(linear, &problem.fresh)?;
     }
     Ok(())

@@ -3,12 +3,11 @@
 use lacuna::data::{Layout, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, uniform};
+use lacuna::matrix::Matrix;
 use lacuna::plugin::density::BoundDensity;
 use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::executor::{Batch, Finished};
-use lacuna::plugin::{Component, Density, Design, Effect, Executor, Hyperparameter};
+use lacuna::plugin::{Component, Density, Design, Effect, Hyperparameter};
 use lacuna::run::Stop;
-use lacuna_linalg::Matrix;
 
 use super::*;
 
@@ -156,27 +155,4 @@ fn faults_of_targets_are_found() {
         assert!(breaches[0].starts_with("target `law`, "));
     }
     assert_eq!(density("law", &Law(Fault::None), &parameters), Ok(()));
-}
-
-/// An executor that runs nothing.
-struct Idle;
-
-impl Component for Idle {}
-
-impl Executor for Idle {
-    fn submit(
-        &self,
-        _: &Batch<'_>,
-        _: &mut dyn FnMut(Finished) -> Result<(), Stop>,
-    ) -> Result<(), Stop> {
-        Ok(())
-    }
-}
-
-#[test]
-fn an_idle_executor_is_found() {
-    let folder = tempfile::tempdir().unwrap();
-    let breaches = executor("idle", &Idle, folder.path()).unwrap_err();
-    assert_eq!(breaches.len(), 4, "{breaches:?}");
-    assert!(breaches[0].ends_with("job 0 is not handed over"), "{breaches:?}");
 }

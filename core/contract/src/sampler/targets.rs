@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
+use lacuna::matrix::Matrix;
 use lacuna::plugin::Target;
-use lacuna_linalg::Matrix;
 
 /// A normal distribution in two correlated coordinates of different scale, under a prior that is three times as wide
 /// and one standard deviation away.

@@ -3,10 +3,10 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use lacuna::math::random::{below, normal, uniform};
+use lacuna::matrix::Matrix;
 use lacuna::plugin::Component;
 use lacuna::plugin::sampler::{Evidence, Plan};
 use lacuna::run::Stop;
-use lacuna_linalg::Matrix;
 
 use super::*;
 

@@ -1,7 +1,7 @@
 //! Surrogates whose fit does not depend on the axes of the outputs.
 
+use lacuna::matrix::{Matrix, multiply_vector};
 use lacuna::plugin::surrogate::Surrogate;
-use lacuna_linalg::{Matrix, multiply_transposed};
 
 use super::{Problem, RUNS};
 use crate::judge::agree;
@@ -19,7 +19,7 @@ pub(super) fn turns(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), 
     let entry = (axes as f64 / MANY as f64).sqrt();
     let q = Matrix::from_fn(MANY, axes, |j, k| if j % axes == k { entry } else { 0.0 });
     let mean = |j: usize| (j % 7) as f64;
-    let mut responses = multiply_transposed(scores, &q);
+    let mut responses = outputs_of(scores, &q);
     for i in 0..RUNS {
         responses.row_mut(i).iter_mut().enumerate().for_each(|(j, y)| *y += mean(j));
     }
@@ -29,7 +29,7 @@ pub(super) fn turns(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), 
     if turned.variance(&problem.fresh).is_some() {
         return Err("the emulator of rotated outputs states a variance".to_owned());
     }
-    let expected = multiply_transposed(&turned.mean(&problem.fresh), &q);
+    let expected = outputs_of(&turned.mean(&problem.fresh), &q);
     let found = plain.mean(&problem.fresh);
     for j in [0, 1, 2, 17, MANY / 2, MANY - 1] {
         let less: Vec<f64> = found.column(j).iter().map(|y| (y - mean(j)) / entry).collect();
@@ -37,4 +37,9 @@ pub(super) fn turns(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), 
         agree(&format!("output {j} in rotated axes, point"), &less, &scores, 1e-6)?;
     }
     Ok(())
+}
+
+/// Values of the outputs for scores, one point a row.
+fn outputs_of(scores: &Matrix, q: &Matrix) -> Matrix {
+    Matrix::from_rows(q.rows(), scores.iter_rows().map(|row| multiply_vector(q, row)))
 }
