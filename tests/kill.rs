@@ -91,6 +91,45 @@ fn a_killed_study_ends_with_the_bits_it_would_have_had() {
     assert_eq!(kept, first_run);
 }
 
+/// The study without an emulator: the evidence needs 640 solutions of several milliseconds.
+fn direct(folder: &Path) {
+    let path = folder.join("study.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let parts = ["[design]", "[simulations]", "[surrogate]"];
+    let sections = text.split_inclusive("\n\n");
+    let kept = sections.filter(|section| !parts.iter().any(|part| section.starts_with(part)));
+    fs::write(&path, kept.collect::<String>()).unwrap();
+    quick::replace(&path, "mesh = [8, 36]", "mesh = \"default\"");
+    quick::replace(&path, "walkers = 24\nsteps = 60", "walkers = 8\nsteps = 80");
+    quick::replace(&path, "emulator_check = 2\n", "");
+}
+
+#[test]
+fn a_killed_evidence_goes_on_with_the_parts_it_has() {
+    let folder = quick::simulated();
+    direct(folder.path());
+    let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
+    let run = |out: &Path| {
+        let mut command = quick::command();
+        command.args(["run", "--threads", "1", "--out"]).arg(out);
+        command.arg(folder.path().join("study.toml"));
+        command
+    };
+    let pieces = broken.join("6-evidence/pieces.bin");
+    let size = || fs::metadata(&pieces).map_or(0, |file| file.len());
+    kill_when(&mut run(&broken), || size() > 0);
+    assert!(!broken.join("6-evidence/stage.json").exists());
+    let before = size();
+    kill_when(&mut resume(&broken), || size() > before);
+
+    let (code, text) = quick::said(&mut resume(&broken));
+    assert_eq!(code, Some(0), "{text}");
+    assert!(!pieces.exists());
+    let (code, text) = quick::said(&mut run(&whole));
+    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(quick::results(&broken), quick::results(&whole));
+}
+
 /// Power analysis of a small study, 70 cases.
 fn power(folder: &Path, out: &Path) -> Command {
     let mut command = quick::command();

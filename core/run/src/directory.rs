@@ -170,6 +170,11 @@ impl RunDirectory {
         self.watched = faults;
     }
 
+    /// The registered faults.
+    pub fn watched(&self) -> &[Arc<Fault>] {
+        &self.watched
+    }
+
     /// Accepts finished results whatever version made them, because inspecting a finished run is no reason to repeat
     /// it.
     pub fn look(&mut self) {

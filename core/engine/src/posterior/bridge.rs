@@ -21,56 +21,101 @@ const FEWEST_STEPS: usize = 20;
 const CONVERGED: f64 = 1e-10;
 const ITERATIONS: usize = 1000;
 
-/// Log evidence of a target from its draws after burn-in.
+/// Log evidence of a target from its draws after burn-in, as [`Bridge`] estimates it.
+///
+/// # Errors
+/// Reason why the evidence cannot be estimated.
+pub fn bridge(target: &dyn Target, draws: &Draws, stream: &Stream) -> Result<Evidence, String> {
+    let bridge = Bridge::new(target, draws, stream)?;
+    bridge.evidence(&bridge.log_density(0..bridge.count()))
+}
+
+/// Estimate of the log evidence of a target from its draws after burn-in, in steps.
 ///
 /// The first half of each chain is used to fit the normal distribution; the second half and as many draws from that
 /// distribution enter the estimate, weighted by the effective sample size of the chains. The standard error is that of
 /// Frühwirth-Schnatter (Econometrics Journal 7 (2004) 143, equation 23), with the autocorrelation of the chains; it
 /// does not include the error of draws that have not converged or miss a mode.
-///
-/// # Errors
-/// Reason why the evidence cannot be estimated.
-pub fn bridge(target: &dyn Target, draws: &Draws, stream: &Stream) -> Result<Evidence, String> {
-    let (d, half) = (draws.dimension(), draws.steps / 2);
-    if half < FEWEST_STEPS || draws.chains * half < 10 * (d + 1) {
-        return Err(format!(
-            "{} draws of {} chains are too few for the evidence: expected at least {} steps of each \
-             and {} draws",
-            draws.len(),
-            draws.chains,
-            2 * FEWEST_STEPS,
-            20 * (d + 1)
-        ));
+pub struct Bridge<'a> {
+    free: Unconstrained<'a>,
+    proposal: Normal,
+    /// Draws of the target.
+    points: Matrix,
+    /// As many draws from the proposal.
+    drawn: Matrix,
+    /// Number of steps of each chain in `points`.
+    steps: usize,
+}
+
+impl<'a> Bridge<'a> {
+    /// The draws at which the density of the target is needed.
+    ///
+    /// # Errors
+    /// Reason why the evidence cannot be estimated.
+    pub fn new(target: &'a dyn Target, draws: &Draws, stream: &Stream) -> Result<Self, String> {
+        let (d, half) = (draws.dimension(), draws.steps / 2);
+        if half < FEWEST_STEPS || draws.chains * half < 10 * (d + 1) {
+            return Err(format!(
+                "{} draws of {} chains are too few for the evidence: expected at least {} steps of each \
+                 and {} draws",
+                draws.len(),
+                draws.chains,
+                2 * FEWEST_STEPS,
+                20 * (d + 1)
+            ));
+        }
+        let free = Unconstrained::new(target);
+        let half_of = |steps: std::ops::Range<usize>| {
+            let places = (0..draws.chains).flat_map(|c| steps.clone().map(move |s| (c, s)));
+            Matrix::from_rows(d, places.map(|(c, s)| free.free(draws.point(c, s))))
+        };
+        // Fit and estimate use different draws: a proposal fitted to the same draws would bias the estimate.
+        let proposal = Normal::fit(&half_of(0..half))?;
+        let (points, steps) = (half_of(half..draws.steps), draws.steps - half);
+        let drawn = proposal.draw(points.rows(), stream);
+        Ok(Self { free, proposal, points, drawn, steps })
     }
-    let free = Unconstrained::new(target);
-    let half_of = |steps: std::ops::Range<usize>| {
-        let places = (0..draws.chains).flat_map(|c| steps.clone().map(move |s| (c, s)));
-        Matrix::from_rows(d, places.map(|(c, s)| free.free(draws.point(c, s))))
-    };
-    // Fit and estimate use different draws: a proposal fitted to the same draws would bias the estimate.
-    let proposal = Normal::fit(&half_of(0..half))?;
-    let (points, steps) = (half_of(half..draws.steps), draws.steps - half);
-    let drawn = proposal.draw(points.rows(), stream);
-    let ratios = |points: &Matrix| -> Vec<f64> {
-        let density = free.log_density(points);
-        density.iter().zip(points.iter_rows()).map(|(l, u)| l - proposal.log_density(u)).collect()
-    };
-    let sides = Sides {
-        of_draws: ratios(&points),
-        of_proposal: ratios(&drawn),
-        share: share_of_draws(&points, steps),
-    };
-    if let Some(l) = sides.of_draws.iter().find(|l| !l.is_finite()) {
-        return Err(format!(
-            "a draw has the log density ratio {l}, which is impossible for a draw from the target"
-        ));
+
+    /// Number of points at which the density is needed.
+    pub fn count(&self) -> usize {
+        self.points.rows() + self.drawn.rows()
     }
-    let log = sides.solve()?;
-    let error = sides.error(log, steps);
-    if !error.is_finite() {
-        return Err("the chains do not move, so that the evidence has no error".into());
+
+    /// Log densities of the target in unconstrained coordinates at some of the points.
+    pub fn log_density(&self, points: std::ops::Range<usize>) -> Vec<f64> {
+        let own = self.points.rows();
+        let point = |i: usize| if i < own { self.points.row(i) } else { self.drawn.row(i - own) };
+        self.free.log_density(&Matrix::from_rows(self.points.columns(), points.map(point)))
     }
-    Ok(Evidence { log, error, method: format!("bridge sampling: {} draws", points.rows()) })
+
+    /// The evidence from the log density at each of the points.
+    ///
+    /// # Errors
+    /// Reason why it cannot be estimated.
+    pub fn evidence(&self, log_density: &[f64]) -> Result<Evidence, String> {
+        let ratios = |points: &Matrix, density: &[f64]| -> Vec<f64> {
+            let rows = density.iter().zip(points.iter_rows());
+            rows.map(|(l, u)| l - self.proposal.log_density(u)).collect()
+        };
+        let (of_draws, of_proposal) = log_density.split_at(self.points.rows());
+        let sides = Sides {
+            of_draws: ratios(&self.points, of_draws),
+            of_proposal: ratios(&self.drawn, of_proposal),
+            share: share_of_draws(&self.points, self.steps),
+        };
+        if let Some(l) = sides.of_draws.iter().find(|l| !l.is_finite()) {
+            return Err(format!(
+                "a draw has the log density ratio {l}, which is impossible for a draw from the target"
+            ));
+        }
+        let log = sides.solve()?;
+        let error = sides.error(log, self.steps);
+        if !error.is_finite() {
+            return Err("the chains do not move, so that the evidence has no error".into());
+        }
+        let method = format!("bridge sampling: {} draws", self.points.rows());
+        Ok(Evidence { log, error, method })
+    }
 }
 
 /// A normal distribution in unconstrained coordinates.

@@ -10,6 +10,7 @@ use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
 use super::calibrate::Law;
+use super::pieces::Pieces;
 
 /// A curve.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -113,6 +114,9 @@ fn scenarios(layout: &Layout) -> Parts {
 /// Number of draws at which a likelihood is computed together.
 const TOGETHER: usize = 32;
 
+/// Number of curves that are left out together.
+const CURVES_TOGETHER: usize = 64;
+
 /// Log density of each curve given all other data and the parameters, `draws x curves`: the log-likelihood of all data
 /// less that of the data without the curve. `None` if the discrepancy has no such form.
 ///
@@ -124,6 +128,7 @@ pub fn left_out(
     ranges: &[Range<usize>],
     responses: &[Vec<f64>],
     (names, hyper): (&[Hyperparameter], &Matrix),
+    pieces: &mut Pieces<'_>,
 ) -> Result<Option<Matrix>, Stop> {
     let mut densities = Matrix::zeros(responses.len(), curves.len());
     let values = |block: usize, likelihood: &dyn Likelihood| -> Vec<f64> {
@@ -156,12 +161,21 @@ pub fn left_out(
             };
             Ok(part.map(|part| values(block, &*part)))
         };
-        let rests: Option<Vec<Vec<f64>>> =
-            own.par_iter().map(of_the_rest).collect::<Result<_, Stop>>()?;
-        let Some(rests) = rests else { return Ok(None) };
-        for (&c, rest) in own.iter().zip(&rests) {
-            for (draw, (all, rest)) in whole.iter().zip(rest).enumerate() {
-                densities[(draw, c)] = all - rest;
+        pieces.expect(own.len().div_ceil(CURVES_TOGETHER));
+        for own in own.chunks(CURVES_TOGETHER) {
+            // Without densities of parts of the data the part is empty.
+            let rests = pieces.next(|| {
+                let rests: Option<Vec<Vec<f64>>> =
+                    own.par_iter().map(of_the_rest).collect::<Result<_, Stop>>()?;
+                Ok(rests.unwrap_or_default().concat())
+            })?;
+            if rests.is_empty() {
+                return Ok(None);
+            }
+            for (&c, rest) in own.iter().zip(rests.chunks_exact(whole.len())) {
+                for (draw, (all, rest)) in whole.iter().zip(rest).enumerate() {
+                    densities[(draw, c)] = all - rest;
+                }
             }
         }
     }

@@ -15,10 +15,13 @@ use serde_json::json;
 
 use super::calibrate::Calibrated;
 use super::curves::{self, Curves};
+use super::pieces::Pieces;
 use super::predictions::{self, Chosen, Predicting, Predictor};
+use super::sampling::broken;
 use super::stream;
 use crate::page::number::significant;
-use crate::posterior::{Posterior, bridge};
+use crate::posterior::Posterior;
+use crate::posterior::bridge::Bridge;
 use crate::study::Study;
 
 pub use kept::{curves_left_out, left_out};
@@ -51,12 +54,14 @@ pub fn stage(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Kept<Weighed>, Stop> {
-    observer.begin(Stage::Evidence.label(), "draw", 0);
+    observer.begin(Stage::Evidence.label(), "part", 0);
+    let faults = run.watched().to_vec();
     let kept = run.keep(
         &Stage::Evidence.folder(),
         &json!([calibrated.hash, study.about.seed]),
         observer,
-        |_| {
+        |folder| {
+            let mut pieces = Pieces::open(folder, &faults, observer)?;
             let draws = calibrated.value.draws.from_step(calibrated.value.outcome.burn_in);
             let mut missing = Vec::new();
             let outcome = &calibrated.value.outcome;
@@ -71,24 +76,18 @@ pub fn stage(
                     missing.push(format!("{text}; use a sampler that gives the evidence itself"));
                     None
                 }
-                None => bridge::bridge(
-                    posterior,
-                    &coordinates(posterior, &thinned(&draws)),
-                    &stream(study, "evidence"),
-                )
-                .map(|found| Evidence {
-                    error: found.error.hypot(posterior.prior().log_error()),
-                    ..found
-                })
-                .map_err(|reason| missing.push(format!("no evidence: {reason}")))
-                .ok(),
+                None => bridged(study, posterior, &draws, &mut pieces)?
+                    .map_err(|reason| missing.push(format!("no evidence: {reason}")))
+                    .ok(),
             };
             let weighed = Weighed { evidence, missing, ..Weighed::default() };
             // Given all other data the distribution of a cut parameter is not that of left-out data.
-            match predictor.filter(|_| outcome.cut.is_none()) {
-                Some(p) => weighed.predicting(study, p, &calibrated.value),
-                None => Ok(weighed),
-            }
+            let weighed = match predictor.filter(|_| outcome.cut.is_none()) {
+                Some(p) => weighed.predicting(study, p, &calibrated.value, &mut pieces)?,
+                None => weighed,
+            };
+            pieces.finish()?;
+            Ok(weighed)
         },
     )?;
     observer.end(Stage::Evidence.label(), &summary(&kept.value));
@@ -106,6 +105,38 @@ fn summary(weighed: &Weighed) -> String {
     parts.extend(loo.map(|l| format!("elpd_loo {:.1} ± {:.1}", l.elpd, error(l))));
     parts.extend(weighed.missing.iter().cloned());
     parts.join(", ")
+}
+
+/// Number of points at which the density is computed together.
+const TOGETHER: usize = 512;
+
+/// The evidence by bridge sampling, or the reason why it cannot be estimated.
+fn bridged(
+    study: &Study,
+    posterior: &Posterior<'_>,
+    draws: &Draws,
+    pieces: &mut Pieces<'_>,
+) -> Result<Result<Evidence, String>, Stop> {
+    let draws = coordinates(posterior, &thinned(draws));
+    let bridge = match Bridge::new(posterior, &draws, &stream(study, "evidence")) {
+        Ok(bridge) => bridge,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    let count = bridge.count();
+    pieces.expect(count.div_ceil(TOGETHER));
+    let mut densities = Vec::with_capacity(count);
+    for first in (0..count).step_by(TOGETHER) {
+        let some = first..count.min(first + TOGETHER);
+        densities.extend(pieces.next(|| {
+            let found = bridge.log_density(some);
+            broken(posterior).map(|()| found)
+        })?);
+    }
+    let with_prior = |found: Evidence| {
+        let error = found.error.hypot(posterior.prior().log_error());
+        Evidence { error, ..found }
+    };
+    Ok(bridge.evidence(&densities).map(with_prior))
 }
 
 /// Approximate number of draws from which the evidence is estimated.
@@ -142,16 +173,17 @@ impl Weighed {
         study: &Study,
         predictor: &Predictor<'_>,
         calibrated: &Calibrated,
+        pieces: &mut Pieces<'_>,
     ) -> Result<Self, Stop> {
         let p = &predictor.densities;
         let data = p.data.count();
         let many = data > sampled::MANY;
         let chosen = Chosen::of(calibrated, if many { sampled::SIZE } else { data });
-        let responses = predictions::responses(study, p, &chosen);
+        let responses = predictions::responses(study, p, &chosen, pieces)?;
         let some = if many {
-            self.of_sample(study, p, &chosen, responses.as_deref())
+            self.of_sample(study, p, &chosen, responses.as_deref(), pieces)?
         } else {
-            self.of_all(study, predictor, &chosen, responses.as_deref())
+            self.of_all(study, predictor, &chosen, responses.as_deref(), pieces)?
         };
         if !some {
             return Ok(self);
@@ -177,7 +209,7 @@ impl Weighed {
         self.by_curve = if curves.all.is_empty() {
             None
         } else {
-            curves::left_out(&curves.all, &p.law, p.data, &ranges, &responses, unknowns)?
+            curves::left_out(&curves.all, &p.law, p.data, &ranges, &responses, unknowns, pieces)?
         };
         let of = |densities| LeaveOneOut::of(densities, chosen.efficiency, Vec::new());
         self.curves_left_out = self.by_curve.as_ref().map(of);
@@ -191,10 +223,11 @@ impl Weighed {
         predictor: &Predictor<'_>,
         chosen: &Chosen,
         responses: Option<&[Vec<f64>]>,
-    ) -> bool {
+        pieces: &mut Pieces<'_>,
+    ) -> Result<bool, Stop> {
         let p = &predictor.densities;
-        let Some(densities) = predictions::pointwise(study, p, chosen, responses) else {
-            return false;
+        let Some(densities) = predictions::pointwise(study, p, chosen, responses, pieces)? else {
+            return Ok(false);
         };
         if !chosen.written {
             let (data, count) = (p.data.count(), chosen.points.rows());
@@ -211,7 +244,7 @@ impl Weighed {
         }
         let curves = Curves::of(p.data);
         self.left_out = Some(LeaveOneOut::of(&densities, chosen.efficiency, curves.of));
-        true
+        Ok(true)
     }
 
     /// Adds the predictions of a sample of many data; false if the discrepancy has none.
@@ -221,8 +254,9 @@ impl Weighed {
         p: &Predicting<'_>,
         chosen: &Chosen,
         responses: Option<&[Vec<f64>]>,
-    ) -> bool {
-        self.left_out = sampled::left_out(study, p, chosen, responses);
+        pieces: &mut Pieces<'_>,
+    ) -> Result<bool, Stop> {
+        self.left_out = sampled::left_out(study, p, chosen, responses, pieces)?;
         let (data, size) = (p.data.count(), sampled::SIZE);
         if self.left_out.is_some() {
             self.missing.push(format!(
@@ -230,6 +264,6 @@ impl Weighed {
                  to `posterior.nc`"
             ));
         }
-        self.left_out.is_some()
+        Ok(self.left_out.is_some())
     }
 }

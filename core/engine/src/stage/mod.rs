@@ -30,6 +30,7 @@ pub mod manifest;
 pub mod mixing;
 pub mod more_runs;
 pub mod numerical_error;
+pub mod pieces;
 pub mod predict;
 mod prediction_errors;
 pub mod predictions;

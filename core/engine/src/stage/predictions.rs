@@ -5,10 +5,12 @@ use lacuna::diagnose::chains;
 use lacuna::math::moments::mean;
 use lacuna::math::random::Stream;
 use lacuna::plugin::{Forward, Likelihood};
+use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
 use super::calibrate::{Calibrated, Law};
+use super::pieces::Pieces;
 use super::{predict, stream};
 use crate::study::Study;
 
@@ -138,9 +140,35 @@ fn efficiency(calibrated: &Calibrated, draws: &Draws, count: usize) -> f64 {
 }
 
 /// Responses at selected draws; `None` if there are too many to hold.
-pub fn responses(study: &Study, p: &Predicting<'_>, chosen: &Chosen) -> Option<Vec<Vec<f64>>> {
-    let held = chosen.points.rows() * p.forward.outputs() <= HELD;
-    held.then(|| predict::responses(study, p.forward, &chosen.points))
+pub fn responses(
+    study: &Study,
+    p: &Predicting<'_>,
+    chosen: &Chosen,
+    pieces: &mut Pieces<'_>,
+) -> Result<Option<Vec<Vec<f64>>>, Stop> {
+    let (count, outputs) = (chosen.points.rows(), p.forward.outputs());
+    if count * outputs > HELD {
+        return Ok(None);
+    }
+    pieces.expect(count.div_ceil(TOGETHER));
+    let mut all = Vec::with_capacity(count);
+    for rows in blocks(count, TOGETHER) {
+        let some = chosen.points.select_rows(&rows);
+        let made = || at_points(study, p, &some).map(|responses| responses.concat());
+        all.extend(pieces.next(made)?.chunks_exact(outputs.max(1)).map(<[f64]>::to_vec));
+    }
+    Ok(Some(all))
+}
+
+/// Responses at points, unless the model has given up.
+fn at_points(study: &Study, p: &Predicting<'_>, points: &Matrix) -> Result<Vec<Vec<f64>>, Stop> {
+    let responses = predict::responses(study, p.forward, points);
+    p.forward.failure().map_or(Ok(responses), |reason| Err(Stop::new(reason)))
+}
+
+/// Consecutive indices, so many together.
+fn blocks(count: usize, together: usize) -> impl Iterator<Item = Vec<usize>> {
+    (0..count).step_by(together).map(move |first| (first..count.min(first + together)).collect())
 }
 
 /// Log density of each datum given all others and the parameters, `draws x data`; `None` if the discrepancy has no such
@@ -150,9 +178,10 @@ pub fn pointwise(
     p: &Predicting<'_>,
     chosen: &Chosen,
     responses: Option<&[Vec<f64>]>,
-) -> Option<Matrix> {
+    pieces: &mut Pieces<'_>,
+) -> Result<Option<Matrix>, Stop> {
     let all = |response: &[f64], hyper: &[f64]| p.likelihood.left_out(response, hyper);
-    by_draw(study, p, chosen, responses, &all)
+    by_draw(study, p, chosen, responses, &all, pieces)
 }
 
 /// Like [`pointwise`], for the data with these indices, which increase.
@@ -162,9 +191,10 @@ pub fn pointwise_at(
     chosen: &Chosen,
     responses: Option<&[Vec<f64>]>,
     data: &[usize],
-) -> Option<Matrix> {
+    pieces: &mut Pieces<'_>,
+) -> Result<Option<Matrix>, Stop> {
     let some = |response: &[f64], hyper: &[f64]| p.likelihood.left_out_at(response, hyper, data);
-    by_draw(study, p, chosen, responses, &some)
+    by_draw(study, p, chosen, responses, &some, pieces)
 }
 
 /// Log densities from the response and the hyperparameters of a draw.
@@ -176,31 +206,40 @@ fn by_draw(
     chosen: &Chosen,
     responses: Option<&[Vec<f64>]>,
     densities: &Densities<'_>,
-) -> Option<Matrix> {
+    pieces: &mut Pieces<'_>,
+) -> Result<Option<Matrix>, Stop> {
     let count = chosen.points.rows();
     let own = p.likelihood.hyperparameters().len();
     let mut all: Option<Matrix> = None;
     let together = TOGETHER.min(VALUES_TOGETHER / p.forward.outputs().max(1)).max(1);
-    for first in (0..count).step_by(together) {
-        let rows: Vec<usize> = (first..count.min(first + together)).collect();
+    pieces.expect(count.div_ceil(together));
+    for rows in blocks(count, together) {
         let some = chosen.points.select_rows(&rows);
-        let made;
-        let at = if let Some(held) = responses {
-            &held[first..first + rows.len()]
-        } else {
-            made = predict::responses(study, p.forward, &some);
-            &made[..]
-        };
-        let left_out = |(i, response): (usize, &Vec<f64>)| {
-            densities(response, &some.row(i)[some.columns() - own..])
-        };
-        let found: Option<Vec<_>> = at.par_iter().enumerate().map(left_out).collect();
-        for (row, density) in rows.iter().zip(found?) {
-            let all = all.get_or_insert_with(|| Matrix::zeros(count, density.len()));
-            all.row_mut(*row).copy_from_slice(&density);
+        // Without densities of left-out data the part is empty.
+        let part = pieces.next(|| {
+            let made;
+            let at = if let Some(held) = responses {
+                &held[rows[0]..rows[0] + rows.len()]
+            } else {
+                made = at_points(study, p, &some)?;
+                &made[..]
+            };
+            let left_out = |(i, response): (usize, &Vec<f64>)| {
+                densities(response, &some.row(i)[some.columns() - own..])
+            };
+            let found: Option<Vec<_>> = at.par_iter().enumerate().map(left_out).collect();
+            Ok(found.unwrap_or_default().concat())
+        })?;
+        if part.is_empty() {
+            return Ok(None);
+        }
+        let data = part.len() / rows.len();
+        let all = all.get_or_insert_with(|| Matrix::zeros(count, data));
+        for (row, density) in rows.iter().zip(part.chunks_exact(data)) {
+            all.row_mut(*row).copy_from_slice(density);
         }
     }
-    all
+    Ok(all)
 }
 
 /// Data simulated at draws of the posterior, one set per row, in the order of the measured ones: the group

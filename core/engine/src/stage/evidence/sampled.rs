@@ -6,9 +6,11 @@ use lacuna::diagnose::leave_one_out::{Approximation, LeaveOneOut, Left};
 use lacuna::diagnose::pareto;
 use lacuna::math::moments::mean;
 use lacuna::math::random::{Stream, below};
+use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
+use crate::stage::pieces::Pieces;
 use crate::stage::predictions::{self, Chosen, Predicting};
 use crate::stage::{curves, predict};
 use crate::study::Study;
@@ -31,13 +33,15 @@ pub(super) fn left_out(
     p: &Predicting<'_>,
     chosen: &Chosen,
     responses: Option<&[Vec<f64>]>,
-) -> Option<LeaveOneOut> {
+    pieces: &mut Pieces<'_>,
+) -> Result<Option<LeaveOneOut>, Stop> {
     let sample = sample(p.data.count(), SIZE);
-    let densities = predictions::pointwise_at(study, p, chosen, responses, &sample)?;
+    let densities = predictions::pointwise_at(study, p, chosen, responses, &sample, pieces)?;
+    let Some(densities) = densities else { return Ok(None) };
     let left = |i: usize| Left::of(&densities.column(i), chosen.efficiency);
     let left = (0..sample.len()).into_par_iter().map(left).collect();
-    let whole = approximation(study, p, &chosen.points, &sample)?;
-    Some(LeaveOneOut::from_sample(left, &whole, pareto::limit(densities.rows())))
+    let whole = approximation(study, p, &chosen.points, &sample);
+    Ok(whole.map(|whole| LeaveOneOut::from_sample(left, &whole, pareto::limit(densities.rows()))))
 }
 
 /// Indices of data drawn without replacement, in increasing order (Floyd's algorithm: Bentley and Floyd, Communications of the

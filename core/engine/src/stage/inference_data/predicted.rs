@@ -6,6 +6,7 @@ use lacuna_linalg::Matrix;
 
 use crate::posterior::Posterior;
 use crate::stage::calibrate::Calibrated;
+use crate::stage::pieces::Pieces;
 use crate::stage::predictions::{self, Chosen, Predictor};
 use crate::stage::{predict, stream};
 use crate::study::Study;
@@ -41,8 +42,10 @@ pub fn from_posterior(
     if !chosen.written || chosen.points.rows() == 0 {
         return Ok(None);
     }
-    let held = predictions::responses(study, &p.densities, &chosen);
-    let log_likelihood = predictions::pointwise(study, &p.densities, &chosen, held.as_deref());
+    let mut pieces = Pieces::unkept();
+    let held = predictions::responses(study, &p.densities, &chosen, &mut pieces)?;
+    let log_likelihood =
+        predictions::pointwise(study, &p.densities, &chosen, held.as_deref(), &mut pieces)?;
     let responses =
         held.unwrap_or_else(|| predict::responses(study, p.densities.forward, &chosen.points));
     if let Some(reason) = p.densities.forward.failure() {
