@@ -38,9 +38,11 @@ impl Nested {
     pub fn new(dimension: usize, degree: usize, truncation: Truncation, limit: usize) -> Self {
         let mut terms = Terms { dimension, exponents: vec![0; dimension] };
         let mut counts = vec![1];
+        let powers: Vec<f64> = (0..=degree).map(|e| (e as f64).powf(truncation.q_norm)).collect();
         for p in 1..=degree {
-            let mut shell =
-                Shell { truncation, p, exponents: vec![0; dimension], found: Vec::new() };
+            let max_interaction = truncation.max_interaction;
+            let (exponents, found) = (vec![0; dimension], Vec::new());
+            let mut shell = Shell { max_interaction, powers: &powers, p, exponents, found };
             // A shell above the limit is abandoned while it is filled: large sets must not even be listed.
             let room = limit.saturating_sub(terms.len());
             if !shell.fill(0, 0.0, 0, room * dimension) {
@@ -104,30 +106,35 @@ impl Sets {
 }
 
 /// Members of degree `p` that are not of degree `p - 1`.
-struct Shell {
-    truncation: Truncation,
+struct Shell<'a> {
+    max_interaction: usize,
+    /// `e^q` for each exponent.
+    powers: &'a [f64],
     p: usize,
     exponents: Vec<u16>,
     found: Vec<u16>,
 }
 
-impl Shell {
+impl Shell<'_> {
+    /// Largest sum of `q`-th powers of a member of degree `p`.
+    fn bound(&self, p: usize) -> f64 {
+        // The sums carry rounding errors; a member on the boundary belongs to the set.
+        self.powers[p] * (1.0 + 1e-12)
+    }
+
     /// Chooses exponents from parameter `i` on; returns false if more than `room` numbers were found.
     fn fill(&mut self, i: usize, norm: f64, active: usize, room: usize) -> bool {
-        let q = self.truncation.q_norm;
-        // Sums of q-th powers carry rounding errors; a member on the boundary belongs to the set.
-        let bound = |p: usize| (p as f64).powf(q) * (1.0 + 1e-12);
         if i == self.exponents.len() {
-            if norm > bound(self.p - 1) {
+            if norm > self.bound(self.p - 1) {
                 self.found.extend(&self.exponents);
             }
             return self.found.len() <= room;
         }
-        let allowed = if active < self.truncation.max_interaction { self.p } else { 0 };
+        let allowed = if active < self.max_interaction { self.p } else { 0 };
         // High exponents of early parameters first: x1, x2, ... within degree 1.
         for e in (0..=allowed).rev() {
-            let sum = norm + if e == 0 { 0.0 } else { (e as f64).powf(q) };
-            if sum > bound(self.p) {
+            let sum = norm + self.powers[e];
+            if sum > self.bound(self.p) {
                 continue;
             }
             self.exponents[i] = e as u16;
