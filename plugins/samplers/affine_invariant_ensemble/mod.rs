@@ -128,7 +128,7 @@ impl Sampler for AffineInvariantEnsemble {
     }
 
     fn plan(&self, dimension: usize) -> Plan {
-        let chains = self.walkers.max(self.least(dimension));
+        let chains = self.planned(dimension);
         Plan { chains, steps: self.steps, warm_up: 0, ensemble: true }
     }
 

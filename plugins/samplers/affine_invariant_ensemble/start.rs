@@ -18,19 +18,18 @@ impl AffineInvariantEnsemble {
         2 * (dimension + 1).max(needed.unwrap_or(1))
     }
 
+    /// Returns the number of walkers for so many unknowns: as stated, or as few as possible.
+    pub(super) fn planned(&self, dimension: usize) -> usize {
+        self.walkers.max(self.least(dimension))
+    }
+
     /// Checks number, dimension, finiteness and spread of the starting points, and the options that depend on them.
     pub(super) fn check_start(&self, dimension: usize, points: &Matrix) -> Result<(), Stop> {
-        chains::check_points(points, self.walkers, dimension, "walkers")?;
+        chains::check_points(points, self.planned(dimension), dimension, "walkers")?;
         let rows = points.rows();
-        let least = self.least(dimension);
-        if rows < least || !rows.is_multiple_of(2) {
+        if !rows.is_multiple_of(2) {
             return Err(Stop::new(format!(
-                "{rows} walkers cannot sample {dimension} unknowns: \
-                 expected an even number, at least {least}"
-            ))
-            .help(format!(
-                "set `walkers` of the sampler to {} or more",
-                least.max(10 * dimension)
+                "{rows} walkers cannot move in two halves: expected an even number"
             )));
         }
         if !(self.stretch > 1.0 && self.stretch.is_finite()) {

@@ -302,7 +302,11 @@ fn bad_starts_say_what_would_be_right() {
     for (message, expected) in [
         (
             start(&ensemble(6, 1), target.prior_draws(6, &Stream::root(1))),
-            "6 walkers cannot sample 3 unknowns: expected an even number, at least 8",
+            "expected a starting point of 3 coordinates for each of 8 walkers, found 6 points of 3",
+        ),
+        (
+            start(&ensemble(9, 1), target.prior_draws(9, &Stream::root(1))),
+            "9 walkers cannot move in two halves: expected an even number",
         ),
         (
             start(&ensemble(20, 1), target.prior_draws(19, &Stream::root(1))),
@@ -320,6 +324,9 @@ fn bad_starts_say_what_would_be_right() {
     ] {
         assert!(message.contains(expected), "{message}");
     }
+    // Too few for all unknowns: the plan has more, and starts with them.
+    let points = target.prior_draws(ensemble(6, 1).plan(3).chains, &Stream::root(1));
+    assert_eq!(ensemble(6, 1).start(&target, points).unwrap().points.rows(), 8);
     let function = |x: &[f64]| Distribution::Exponential(1.0).log_density(x[0]);
     let half = Density { dimension: 1, centre: 0.0, spread: 1.0, function };
     let message =
