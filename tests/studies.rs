@@ -144,6 +144,19 @@ fn what_is_kept_is_taken_and_only_what_depends_on_a_change_is_made_again() {
         run(folder.path(), &["validate.emulator_check=1"], "run").made,
         ["6-validate", "6-assess"]
     );
+    // The emulator is checked at the same draws, whether the cases are simulated or not.
+    let validated = |settings: &[&str]| -> serde_json::Value {
+        run(folder.path(), settings, "run");
+        lacuna::run::files::read_json(&out.join("6-validate/validation.json")).unwrap()
+    };
+    let (again, emulated) = (validated(&[]), validated(&["validate.rerun_model=false"]));
+    let cases = |v: &serde_json::Value| [0, 1].map(|i| v["cases"][i]["simulated"].clone());
+    assert_eq!(
+        (cases(&again), cases(&emulated)),
+        ([true.into(), true.into()], [false.into(), false.into()])
+    );
+    assert_eq!(again["emulator_at_posterior"][1], 2);
+    assert_eq!(again["emulator_at_posterior"], emulated["emulator_at_posterior"]);
     // A title that no result depends on.
     assert_eq!(run(folder.path(), &["study.title=\"Another title\""], "run").made, [""; 0]);
     // Another measurement: the runs are kept.

@@ -14,6 +14,7 @@ use lacuna::plugin::{Emulator, Forward, Likelihood};
 use lacuna::run::{Observer, Progress, Stop, files};
 use lacuna_linalg::Matrix;
 use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -116,6 +117,9 @@ struct Prediction {
     spread: Vec<(String, f64)>,
 }
 
+/// Response of the model to a point, or why there is none.
+type Simulated = Result<Vec<f64>, EvalError>;
+
 struct Work<'a> {
     study: &'a Study,
     measured: &'a Measured,
@@ -136,47 +140,83 @@ impl Work<'_> {
         let mut failed = Vec::new();
         let map = &calibrated.outcome.map;
         let d = self.study.parameters.len();
+        let reference = self.reference();
+        let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
+        let checked = self.checked(&draws);
+        let rerun = self.rerun && self.simulator.is_some();
+        let cases = [Some(&map[..d]), reference.as_deref()].into_iter().flatten();
+        let again = cases.filter(|_| rerun);
+        let mut simulated =
+            self.simulated(again.chain(checked.iter().map(Vec::as_slice)).collect());
         let effects = self.study.placed_effects();
         let with_effects = |response| predict::with_effects(&effects, response, map.split_at(d));
-        let mut cases = vec![self.case("map", &map[..d], &with_effects, &mut failed)?];
-        if self.study.validate.against == Some(Against::Reference) {
-            // The reference of a field is its mean or median.
-            let of_fields = |unknown: &Unknown| unknown.of_field().then_some(0.0);
-            let both = self.study.parameters.iter().zip(&self.study.unknowns);
-            let point: Vec<f64> = both
-                .filter_map(|(p, unknown)| p.reference.or_else(|| of_fields(unknown)))
-                .collect();
+        let mut next = || if rerun { simulated.next() } else { None };
+        let mut cases = vec![self.case("map", &map[..d], next(), &with_effects, &mut failed)?];
+        if let Some(point) = &reference {
             // Reference values are those of the model alone.
-            cases.push(self.case("reference", &point, &|response| response, &mut failed)?);
+            cases.push(self.case("reference", point, next(), &|response| response, &mut failed)?);
         }
-        let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
         let random = stream(self.study, "validate");
-        let emulator_at_posterior = self.check_emulator(&draws, &mut failed)?;
+        let emulator_at_posterior = self.check_emulator(&checked, simulated, &mut failed)?;
         let Prediction { band, spread } = self.predict(calibrated, &draws, likelihood, &random);
         Ok(Validated { cases, predictive: band, spread, emulator_at_posterior, failed })
     }
 
+    /// The reference of the parameters, if the study compares with it.
+    fn reference(&self) -> Option<Vec<f64>> {
+        // The reference of a field is its mean or median.
+        let of_fields = |unknown: &Unknown| unknown.of_field().then_some(0.0);
+        let both = self.study.parameters.iter().zip(&self.study.unknowns);
+        let values = both.filter_map(|(p, unknown)| p.reference.or_else(|| of_fields(unknown)));
+        (self.study.validate.against == Some(Against::Reference)).then(|| values.collect())
+    }
+
+    /// Evenly spaced posterior draws at which the emulator is compared with new runs of the model.
+    fn checked(&self, draws: &Draws) -> Vec<Vec<f64>> {
+        let count = self.study.validate.emulator_check.min(draws.len());
+        if count == 0 || self.simulator.is_none() {
+            return Vec::new();
+        }
+        let d = self.study.parameters.len();
+        let points = draws.points();
+        let place = |k: usize| (2 * k + 1) * draws.len() / (2 * count);
+        (0..count).map(|k| points.row(place(k))[..d].to_vec()).collect()
+    }
+
+    /// Responses of the model to some parameters, in their order.
+    fn simulated(&self, points: Vec<&[f64]>) -> std::vec::IntoIter<Simulated> {
+        let Some(simulator) = &self.simulator else { return Vec::new().into_iter() };
+        let respond = |point: &&[f64]| {
+            let response = simulator.respond(point).map(|response| response.values);
+            self.progress.add(1);
+            response
+        };
+        points.par_iter().map(respond).collect::<Vec<_>>().into_iter()
+    }
+
+    /// Compares a point with the data: the response of the model there, or without one that of the emulator.
     fn case(
         &self,
         name: &str,
         point: &[f64],
+        simulated: Option<Simulated>,
         with_effects: &dyn Fn(Vec<f64>) -> Vec<f64>,
         failed: &mut Vec<String>,
     ) -> Result<ValidationCase, Stop> {
-        let simulated = match (&self.simulator, self.rerun) {
-            (Some(simulator), true) => match simulator.respond(point) {
-                Ok(response) => Some(self.with_numerics(response.values, point)),
-                Err(EvalError::Rejected(reason)) => {
-                    failed.push(format!(
-                        "the evaluation of the model at the {name} parameters failed: {reason}"
-                    ));
-                    None
-                }
-                Err(EvalError::Fatal(reason)) => return Err(Stop::new(reason)),
-            },
-            _ => None,
+        let simulated = match simulated {
+            Some(Ok(values)) => Some(self.with_numerics(values, point)),
+            Some(Err(EvalError::Rejected(reason))) => {
+                failed.push(format!(
+                    "the evaluation of the model at the {name} parameters failed: {reason}"
+                ));
+                None
+            }
+            Some(Err(EvalError::Fatal(reason))) => return Err(Stop::new(reason)),
+            None => {
+                self.progress.add(1);
+                None
+            }
         };
-        self.progress.add(1);
         let row = Matrix::from_vec(1, point.len(), point.to_vec());
         let is_simulated = simulated.is_some();
         let response = simulated.unwrap_or_else(|| self.forward.mean(&row).row(0).to_vec());
@@ -206,27 +246,23 @@ impl Work<'_> {
         response
     }
 
-    /// Compares the emulator with new runs of the model at evenly spaced posterior draws.
+    /// Compares the emulator with new runs of the model at these parameters.
     fn check_emulator(
         &self,
-        draws: &Draws,
+        points: &[Vec<f64>],
+        simulated: impl Iterator<Item = Simulated>,
         failed: &mut Vec<String>,
     ) -> Result<Option<(f64, usize)>, Stop> {
-        let count = self.study.validate.emulator_check.min(draws.len());
-        let (Some(simulator), true) = (&self.simulator, count > 0) else { return Ok(None) };
-        let d = self.study.parameters.len();
-        let points = draws.points();
         let (mut squares, mut checked) = (0.0, 0);
-        for k in 0..count {
-            let point = &points.row((2 * k + 1) * draws.len() / (2 * count))[..d];
-            match simulator.respond(point) {
+        for (point, simulated) in points.iter().zip(simulated) {
+            match simulated {
                 Ok(response) => {
-                    let row = Matrix::from_vec(1, d, point.to_vec());
+                    let row = Matrix::from_vec(1, point.len(), point.clone());
                     let emulated = match self.emulator {
                         Some(emulator) => emulator.mean(&row),
                         None => self.forward.mean(&row),
                     };
-                    let pairs = response.values.iter().zip(emulated.row(0));
+                    let pairs = response.iter().zip(emulated.row(0));
                     squares += pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>();
                     checked += 1;
                 }
@@ -237,7 +273,6 @@ impl Work<'_> {
                 }
                 Err(EvalError::Fatal(reason)) => return Err(Stop::new(reason)),
             }
-            self.progress.add(1);
         }
         let outputs = self.study.layouts.len() as f64;
         Ok((checked > 0)
