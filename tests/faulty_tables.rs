@@ -13,7 +13,7 @@ use crate::quick::{self, replace};
 fn said(folder: &Path, settings: &[&str]) -> String {
     let file = folder.join("study.toml");
     let study = quick::load(&file, settings);
-    let wrong = contents::check(&study);
+    let wrong = contents::check(&study).err().unwrap_or_default();
     let text: Vec<String> = wrong.iter().map(ToString::to_string).collect();
     let text = text.join("\n");
     let mut quickly = vec!["sampler.steps=4"];
@@ -210,7 +210,8 @@ fn all_faults_are_told_at_once() {
     edit(&data, 7, |line| format!("{line},"));
     edit(&folder.path().join("runs.csv"), 9, field(2, "x"));
     let study = quick::load(&folder.path().join("study.toml"), &[]);
-    let wrong: Vec<String> = contents::check(&study).iter().map(ToString::to_string).collect();
+    let wrong: Vec<String> =
+        contents::check(&study).unwrap_err().iter().map(ToString::to_string).collect();
     let places: Vec<&str> = wrong
         .iter()
         .map(|text| text.split(':').next().unwrap().rsplit('/').next().unwrap())
@@ -299,8 +300,8 @@ fn sound_tables_of_any_form_are_read_alike() {
         let folder = quick::tables();
         fs::write(folder.path().join("measured.csv"), bytes).unwrap();
         let study = quick::load(&folder.path().join("study.toml"), &[]);
-        let wrong: Vec<String> = contents::check(&study).iter().map(ToString::to_string).collect();
-        assert_eq!(wrong, Vec::<String>::new());
+        let wrong = contents::check(&study).err().unwrap_or_default();
+        assert_eq!(wrong, Vec::<lacuna::run::Stop>::new());
         let section = study.measurements.as_ref().unwrap();
         let (layout, _) = study.layouts.of_scenario("").unwrap();
         let source = lacuna::plugin::reader::MeasurementSource {

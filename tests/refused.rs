@@ -6,6 +6,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use lacuna_engine::study::resolve::{Use, load_for, load_text};
+use lacuna_engine::study::sizes::fits_on_disk;
 
 use crate::quick;
 
@@ -79,6 +80,61 @@ fn impossible_sizes_are_refused_where_they_stand() {
     // The number of halvings may be arbitrarily large: the run ends by itself, and steps are not draws.
     let fine = complaints(&["sampler.use=nested", "sampler.halvings=1000000000"]);
     assert!(!fine.contains("memory"), "{fine}");
+}
+
+/// Parts that fit into the memory of this machine one by one, and not together.
+#[test]
+fn memory_is_compared_with_all_parts_together() {
+    let Some(memory) = lacuna::text::memory::of_machine() else { return };
+    let folder = quick::simulated();
+    let path = folder.path().join("study.toml");
+    // Three parameters and sixty outputs, which are held twice while runs are read.
+    let runs = (0.6 * memory / (8.0 * 123.0)).floor();
+    let complaints = |settings: &[String]| load_for(&path, settings, Use::Check).complaints();
+    let one = format!("design.runs={runs}");
+    assert_eq!(complaints(std::slice::from_ref(&one)), "");
+    let text = complaints(&[one, format!("design.extended=[{}]", runs - 1.0)]);
+    assert!(text.contains("the study needs"), "{text}");
+    assert!(
+        text.contains("the largest part: the runs") && text.contains("`design.runs`"),
+        "{text}"
+    );
+    assert!(text.contains("this machine has"), "{text}");
+}
+
+/// The files of a run are compared with the disk before it begins.
+#[test]
+fn files_are_compared_with_the_free_disk() {
+    let folder = quick::simulated();
+    let study = quick::load(&folder.path().join("study.toml"), &[]);
+    // 40 runs of 63 numbers; three copies of 24 x 60 draws of four numbers.
+    assert_eq!(fits_on_disk(&study, 2e5), Ok(()));
+    let text = fits_on_disk(&study, 1e5).unwrap_err();
+    assert_eq!(
+        text,
+        "the study writes 158 kB, and 100 kB are free; the largest part: the draws, 138 kB (`sampler.steps`)"
+    );
+}
+
+#[test]
+fn check_tells_the_memory_of_a_large_study() {
+    let folder = quick::simulated();
+    let check = |setting: &str| {
+        let mut lacuna = quick::command();
+        let output = lacuna.arg("check").arg(folder.path().join("study.toml"));
+        let output = output.args(["--set", setting]).output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8(output.stdout).unwrap()
+    };
+    assert!(!check("sampler.steps=60").contains("memory"));
+    // Four numbers of 24 walkers at each step, twice, beside 40 runs and the measurements.
+    let text = check("sampler.steps=100000");
+    assert!(
+        text.contains(
+            "needs 154 MB of memory; the largest part: the draws, 154 MB (`sampler.steps`)"
+        ),
+        "{text}"
+    );
 }
 
 /// An interpreter that leaves a file behind when it is started.

@@ -12,6 +12,7 @@ use lacuna_engine::report::findings::Findings;
 use lacuna_engine::report::summary_text;
 use lacuna_engine::stage;
 use lacuna_engine::study::resolve::{self, Use};
+use lacuna_engine::study::sizes::Memory;
 use lacuna_engine::study::{Checked, Study};
 use lacuna_run::RunDirectory;
 
@@ -104,6 +105,9 @@ pub fn folder(study: &Study, out: Option<&Path>) -> PathBuf {
     folders().find(is_own).or_else(|| folders().find(is_free)).unwrap_or_else(|| runs.join(long))
 }
 
+/// Memory above which `lacuna check` tells what a study needs, in bytes.
+const TOLD: f64 = 1e8;
+
 /// Runs `lacuna check STUDY`.
 pub fn check(path: &Path, settings: &Settings) -> anyhow::Result<()> {
     // What the command line names is trusted: its options are checked too.
@@ -113,13 +117,16 @@ pub fn check(path: &Path, settings: &Settings) -> anyhow::Result<()> {
         print(&plugins::would_load(library));
     }
     let study = sound(checked, path)?;
-    let wrong = stage::contents::check(&study);
-    if !wrong.is_empty() {
+    let measured = stage::contents::check(&study).map_err(|wrong| {
         let texts: Vec<String> = wrong.iter().map(ToString::to_string).collect();
         let plural = if wrong.len() == 1 { "" } else { "s" };
         let (count, files) = (wrong.len(), path.display());
         let text = texts.join("\n\n");
-        return Err(misuse(format!("{text}\n\n{count} problem{plural} in the files of {files}")));
+        misuse(format!("{text}\n\n{count} problem{plural} in the files of {files}"))
+    })?;
+    let memory = Memory::of(&study, measured);
+    if let Some(memory) = &memory {
+        memory.fits().map_err(misuse)?;
     }
     let response = match &study.target {
         Some(_) => String::new(),
@@ -127,6 +134,9 @@ pub fn check(path: &Path, settings: &Settings) -> anyhow::Result<()> {
     };
     let parameters = study.parameters.len();
     print(&format!("{}: no problems; {parameters} parameters{response}", path.display()));
+    if let Some(memory) = memory.filter(|memory| memory.bytes > TOLD) {
+        print(&memory.to_string());
+    }
     if let Some(runs) = stage::quantities::runs(&study) {
         print(&if study.intervals().is_empty() {
             format!("the priors are propagated with {runs} runs of the model (`forward.draws`)")

@@ -66,7 +66,7 @@ pub fn stopped(stop: &Stop) -> PyErr {
 pub fn check(py: Python<'_>, source: Source) -> PyResult<()> {
     py.detach(|| {
         let study = source.load(Use::Check)?;
-        let wrong = contents::check(&study);
+        let wrong = contents::check(&study).err().unwrap_or_default();
         if wrong.is_empty() {
             return Ok(());
         }

@@ -32,7 +32,7 @@ fn one_wrong_number_in_the_table_of_parameters_stops_the_run_with_its_line() {
     assert!(text.contains("outside_design = \"allow\""));
     // A check says the same before anything is run.
     let study = quick::load(&folder.path().join("study.toml"), &[]);
-    assert_eq!(contents::check(&study)[0].to_string(), text);
+    assert_eq!(contents::check(&study).unwrap_err()[0].to_string(), text);
     let assessment = assess(folder.path(), &["simulations.outside_design=\"allow\""]);
     found(&assessment, "runs_outside_design", Severity::Reservation);
     // Inside the design the response reveals it.

@@ -36,7 +36,7 @@ use crate::stage::predictions::{Predicting, Predictor};
 use crate::stage::surrogate::Fitting;
 use crate::stage::{
     assess, calibrate, contents, design, evidence, grouped, inference_data, low_fidelity, manifest,
-    numerical_error, quantities, read, refine, reliability, sequential, simulate, surrogate,
+    numerical_error, quantities, read, refine, reliability, room, sequential, simulate, surrogate,
     target, validate,
 };
 use crate::study::Study;
@@ -177,6 +177,7 @@ fn pursue(
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
     contents::before_all(study)?;
+    room::check(study, run.root())?;
     manifest::begin(study, run)?;
     let recorded = Recorded::new(run.root(), observer);
     let listener = Listener::new(&recorded);

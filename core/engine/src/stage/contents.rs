@@ -9,18 +9,21 @@ use lacuna::run::Stop;
 use super::{imports, read, surrogate};
 use crate::study::Study;
 
-/// All faults in the files that a study names, with the messages of the run that would reject them. No model and no
-/// interpreter is started; files are opened by the study's readers.
-pub fn check(study: &Study) -> Vec<Stop> {
-    let mut wrong = measurements(study).err().unwrap_or_default();
+/// Number of measured values, or all faults in the files that a study names, with the messages of the run that would reject
+/// them. No model and no interpreter is started; files are opened by the study's readers.
+pub fn check(study: &Study) -> Result<usize, Vec<Stop>> {
+    let (measured, mut wrong) = match measurements(study) {
+        Ok(measured) => (measured, Vec::new()),
+        Err(wrong) => (0, wrong),
+    };
     wrong.extend(simulations(study));
     wrong.extend(imports::read(study).err());
-    wrong
+    if wrong.is_empty() { Ok(measured) } else { Err(wrong) }
 }
 
 /// Rejects measurements that no run could use, before a simulation campaign rather than after it.
 pub fn before_all(study: &Study) -> Result<(), Stop> {
-    measurements(study).map_err(|all| one(&all))
+    measurements(study).map(|_| ()).map_err(|all| one(&all))
 }
 
 /// Combines several errors into one.
@@ -46,13 +49,16 @@ fn is_there(name: &str) -> bool {
     entries::<dyn Reader>().iter().any(|entry| entry.name == name)
 }
 
-fn measurements(study: &Study) -> Result<(), Vec<Stop>> {
+/// Number of measured values.
+fn measurements(study: &Study) -> Result<usize, Vec<Stop>> {
     if !study.measurements.as_ref().is_some_and(|s| is_there(s.built.name)) {
-        return Ok(());
+        return Ok(0);
     }
-    let measured = read::measured_or_all(study)?;
-    let states_noise = measured.is_some_and(|measured| measured.read.states_noise());
-    if states_noise { can_use_noise(study).map_err(|stop| vec![stop]) } else { Ok(()) }
+    let Some(measured) = read::measured_or_all(study)? else { return Ok(0) };
+    if measured.read.states_noise() {
+        can_use_noise(study).map_err(|stop| vec![stop])?;
+    }
+    Ok(measured.read.count())
 }
 
 /// Checks that noise stated by the measurements can be used.

@@ -40,6 +40,7 @@ pub mod refine;
 pub mod reliability;
 mod replicate_error;
 pub mod results;
+pub mod room;
 pub mod sampling;
 pub mod screen;
 pub mod sequential;

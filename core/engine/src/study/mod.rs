@@ -27,7 +27,7 @@ mod resolved;
 pub mod scenario;
 pub mod schema;
 mod sections;
-mod sizes;
+pub mod sizes;
 pub mod start;
 pub mod table;
 pub mod unknowns;

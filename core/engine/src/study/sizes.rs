@@ -1,4 +1,7 @@
-//! Memory needed by the sizes in a study: an impossible size is refused before anything is allocated.
+//! Memory needed by the sizes in a study: an impossible size is refused before anything is allocated, and so is a study whose
+//! parts do not fit together.
+
+use std::fmt;
 
 use lacuna::plugin::sampler::Plan;
 use lacuna::text::memory::{MOST, NUMBER, amount, of_machine};
@@ -6,6 +9,8 @@ use lacuna::text::{Complaints, Node, Problems};
 
 use super::plain::Study;
 
+/// Memory of a measured value, which may be missing, in bytes.
+const MEASURED: f64 = 2.0 * NUMBER;
 /// The largest whole number among the options of a plugin.
 const LARGEST: i64 = i32::MAX as i64;
 /// Whole numbers that are no sizes, by their names.
@@ -21,6 +26,75 @@ struct Need {
     size: f64,
     /// The memory that this size takes, in bytes.
     bytes: f64,
+    /// Size of the files that contain it, in bytes.
+    written: f64,
+}
+
+/// Memory that a study needs at least.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Memory {
+    /// Memory of all parts, in bytes.
+    pub bytes: f64,
+    /// The largest part, such as `the runs`.
+    pub largest: &'static str,
+    /// Key in the study that sets the size of this part.
+    pub key: String,
+    /// Memory of this part, in bytes.
+    pub part: f64,
+}
+
+impl Memory {
+    /// The memory that a study with so many measured values needs; `None` if it states no size.
+    pub fn of(study: &Study, measured: usize) -> Option<Self> {
+        let mut needs = needs(study);
+        let bytes = MEASURED * measured as f64;
+        needs.push(Need {
+            key: "measurements".to_owned(),
+            what: "the measured values",
+            size: measured as f64,
+            bytes,
+            written: 0.0,
+        });
+        let bytes = needs.iter().map(|need| need.bytes).sum();
+        let largest = needs.into_iter().max_by(|a, b| a.bytes.total_cmp(&b.bytes))?;
+        let Need { key, what, bytes: part, .. } = largest;
+        (bytes > 0.0).then_some(Self { bytes, largest: what, key, part })
+    }
+
+    /// An error if this machine has less.
+    pub fn fits(&self) -> Result<(), String> {
+        match of_machine() {
+            Some(memory) if self.bytes > memory => {
+                Err(format!("{self}; this machine has {}", amount(memory)))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Refuses a study whose files do not fit into the free space of a disk, in bytes.
+pub fn fits_on_disk(study: &Study, free: f64) -> Result<(), String> {
+    let needs = needs(study);
+    let written: f64 = needs.iter().map(|need| need.written).sum();
+    let Some(largest) = needs.into_iter().max_by(|a, b| a.written.total_cmp(&b.written)) else {
+        return Ok(());
+    };
+    if written <= free {
+        return Ok(());
+    }
+    let Need { key, what, written: part, .. } = largest;
+    let [written, part, free] = [written, part, free].map(amount);
+    Err(format!(
+        "the study writes {written}, and {free} are free; the largest part: {what}, {part} (`{key}`)"
+    ))
+}
+
+impl fmt::Display for Memory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bytes, largest, key, part } = self;
+        let (all, part) = (amount(*bytes), amount(*part));
+        write!(f, "the study needs {all} of memory; the largest part: {largest}, {part} (`{key}`)")
+    }
 }
 
 /// Reports a response that is too large, all its axes together.
@@ -55,17 +129,25 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     }
 }
 
-/// Reports every size that this machine cannot hold.
+/// Reports every size that this machine cannot hold, or else that it cannot hold all of them together.
 pub(super) fn environment(study: &Study, root: &Node, problems: &mut Problems) {
-    if let Some(memory) = of_machine() {
-        refuse(study, memory, "this machine has", root, problems);
+    let Some(memory) = of_machine() else { return };
+    let before = problems.len();
+    refuse(study, memory, "this machine has", root, problems);
+    if problems.len() > before {
+        return;
+    }
+    if let Some(needed) = Memory::of(study, 0)
+        && let Err(said) = needed.fits()
+    {
+        Complaints::new(root, problems).at(&needed.key).say(said);
     }
 }
 
 fn refuse(study: &Study, most: f64, whose: &str, root: &Node, problems: &mut Problems) {
     let mut complaints = Complaints::new(root, problems);
     for need in needs(study).into_iter().filter(|need| need.bytes > most) {
-        let Need { key, what, size, bytes } = need;
+        let Need { key, what, size, bytes, .. } = need;
         complaints
             .at(&key)
             .say(format!("{what} need {} of memory; {whose} {}", amount(bytes), amount(most)))
@@ -77,9 +159,10 @@ fn refuse(study: &Study, most: f64, whose: &str, root: &Node, problems: &mut Pro
 /// Everything in a study that is a size, with what it asks for.
 fn needs(study: &Study) -> Vec<Need> {
     let mut needs = Vec::new();
-    let mut add = |key: &str, what, size: usize, numbers: f64| {
+    let mut add = |key: &str, what, size: usize, numbers: f64, written: f64| {
         let (size, key) = (size as f64, key.to_owned());
-        needs.push(Need { key, what, size, bytes: NUMBER * size * numbers });
+        let [bytes, written] = [numbers, written].map(|each| NUMBER * size * each);
+        needs.push(Need { key, what, size, bytes, written });
     };
     let parameters = study.parameters.len() as f64;
     let outputs = study.layouts.len() as f64;
@@ -87,31 +170,44 @@ fn needs(study: &Study) -> Vec<Need> {
     let derived = study.surrogate.as_ref().is_some_and(|section| section.common.gradients);
     let slopes = if derived { 2.0 * outputs * parameters } else { 0.0 };
     let run = parameters + 2.0 * outputs + slopes;
+    let kept = parameters + outputs + slopes / 2.0;
     if let Some(design) = &study.design {
-        add("design.runs", "the runs", design.common.runs.get(), run);
+        add("design.runs", "the runs", design.common.runs.get(), run, kept);
         for (i, more) in design.common.extended.iter().enumerate() {
-            add(&format!("design.extended.{i}"), "the runs", more.get(), run);
+            add(&format!("design.extended.{i}"), "the runs", more.get(), run, kept);
         }
     }
     if let Some(refine) = study.surrogate.as_ref().and_then(|s| s.common.refine.as_ref()) {
         let rounds = refine.rounds.get() as f64;
-        add("surrogate.refine.runs", "the runs of all rounds", refine.runs.get(), rounds * run);
+        add(
+            "surrogate.refine.runs",
+            "the runs of all rounds",
+            refine.runs.get(),
+            rounds * run,
+            rounds * kept,
+        );
     }
     if let Some(error) = &study.numerical_error {
-        add("numerical_error.runs", "the finer runs", error.runs, run);
+        add("numerical_error.runs", "the finer runs", error.runs, run, kept);
     }
     if let Some(draws) = study.propagated() {
         // The values of all quantities in a few variants, and the inputs.
         let asked = study.quantities.len() as f64;
-        add("forward.draws", "the draws", draws, parameters + 10.0 * asked);
+        add("forward.draws", "the draws", draws, parameters + 10.0 * asked, parameters + asked);
         if !study.intervals().is_empty() {
             // The figures and the bounds of the distribution of each quantity.
             let search = study.interval_search();
-            add("forward.intervals.points", "the points", search.points, parameters + 50.0 * asked);
-            add("forward.intervals.draws", "the draws", search.draws, parameters + asked);
+            add(
+                "forward.intervals.points",
+                "the points",
+                search.points,
+                parameters + 50.0 * asked,
+                0.0,
+            );
+            add("forward.intervals.draws", "the draws", search.draws, parameters + asked, 0.0);
         }
     }
-    add("validate.emulator_check", "the runs", study.validate.emulator_check, run);
+    add("validate.emulator_check", "the runs", study.validate.emulator_check, run, 0.0);
     if let Some(section) = &study.sampler {
         let plan = section.built.plugin.plan(study.parameters.len());
         let steps = section.built.plugin.uses_starts() && plan.warm_up < plan.steps;
@@ -120,7 +216,9 @@ fn needs(study: &Study) -> Vec<Need> {
         let numbers = 2.0 * (parameters + 1.0) * chains as f64 * steps as f64;
         if let Some((key, size)) = largest(&section.built.options) {
             let key = format!("sampler.{key}");
-            add(&key, "the draws", size as usize, numbers / (size as f64).max(1.0));
+            let each = numbers / (size as f64).max(1.0);
+            // As the sampler writes them, as the stage keeps them, and in `posterior.nc`.
+            add(&key, "the draws", size as usize, each, 1.5 * each);
         }
     }
     needs

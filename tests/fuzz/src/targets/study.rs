@@ -48,7 +48,7 @@ fn check(path: &Path, text: &str) {
         return;
     };
     assert!(complaints.is_empty(), "accepted with a complaint: {complaints}");
-    contents::check(study).iter().for_each(says_why);
+    contents::check(study).err().iter().flatten().for_each(says_why);
     let written = emit::to_toml(&study.resolved).expect("a sound study can be written");
     let again = resolve::load_text_for(path, &written, Use::Check);
     let study = again.study.as_ref().unwrap_or_else(|| {
