@@ -91,7 +91,7 @@ fn a_killed_study_ends_with_the_bits_it_would_have_had() {
     assert_eq!(kept, first_run);
 }
 
-/// The study without an emulator: the evidence needs 640 solutions of several milliseconds.
+/// The study without an emulator: the evidence needs 2200 solutions of more than a millisecond.
 fn direct(folder: &Path) {
     let path = folder.join("study.toml");
     let text = fs::read_to_string(&path).unwrap();
@@ -99,8 +99,9 @@ fn direct(folder: &Path) {
     let sections = text.split_inclusive("\n\n");
     let kept = sections.filter(|section| !parts.iter().any(|part| section.starts_with(part)));
     fs::write(&path, kept.collect::<String>()).unwrap();
-    quick::replace(&path, "mesh = [8, 36]", "mesh = \"default\"");
-    quick::replace(&path, "walkers = 24\nsteps = 60", "walkers = 8\nsteps = 80");
+    // Away from the end of the range, where a difference would leave it.
+    quick::replace(&path, "uniform = [0.0, 1.0e6]", "uniform = [5.0e4, 1.0e6]");
+    quick::replace(&path, "walkers = 24\nsteps = 60", "walkers = 8\nsteps = 300");
     quick::replace(&path, "emulator_check = 2\n", "");
 }
 
@@ -119,8 +120,6 @@ fn a_killed_evidence_goes_on_with_the_parts_it_has() {
     let size = || fs::metadata(&pieces).map_or(0, |file| file.len());
     kill_when(&mut run(&broken), || size() > 0);
     assert!(!broken.join("6-evidence/stage.json").exists());
-    let before = size();
-    kill_when(&mut resume(&broken), || size() > before);
 
     let (code, text) = quick::said(&mut resume(&broken));
     assert_eq!(code, Some(0), "{text}");
