@@ -98,6 +98,30 @@ fn the_best_fit_is_kept() {
     assert!(search < 1500, "the search takes {search} runs of the model");
 }
 
+/// A model may be meaningless outside of the prior: no difference is taken there.
+#[test]
+fn derivatives_at_the_ends_of_a_prior_stay_inside() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("study.toml"), STUDY).unwrap();
+    let noted = MODEL.replace("calls.write(\"x\")", "calls.write(f\"{slope!r}\\n\")");
+    fs::write(folder.path().join("line.py"), noted).unwrap();
+    fs::write(folder.path().join("y.csv"), "replicate,time [s],y\n0,1,1.0\n").unwrap();
+    let study = quick::load(&folder.path().join("study.toml"), &[]);
+    let map = ModelMap::of(&study).unwrap();
+    for slope in [0.0, 1.0, 2.0] {
+        let (mean, jacobian) = map.mean_and_jacobian(&[slope]);
+        for (i, time) in (1..=8).map(f64::from).enumerate() {
+            assert!((mean[i] - slope * time).abs() < 1e-12);
+            assert!((jacobian[(i, 0)] - time).abs() < 1e-8, "{slope}: {}", jacobian[(i, 0)]);
+        }
+    }
+    let text = fs::read_to_string(folder.path().join("calls")).unwrap();
+    let slopes: Vec<f64> = text.lines().map(|line| line.parse().unwrap()).collect();
+    // The points, a neighbour of each end and two of the middle.
+    assert_eq!(slopes.len(), 7);
+    assert!(slopes.iter().all(|slope| (0.0..=2.0).contains(slope)), "{slopes:?}");
+}
+
 const DECAY: &str = r#"
 [study]
 name = "decay"

@@ -161,9 +161,9 @@ pub fn left_out(
             };
             Ok(part.map(|part| values(block, &*part)))
         };
-        pieces.expect(own.len().div_ceil(CURVES_TOGETHER));
+        pieces.announce(own.len().div_ceil(CURVES_TOGETHER));
         for own in own.chunks(CURVES_TOGETHER) {
-            // Without densities of parts of the data the part is empty.
+            // Without densities of parts of the data the piece is empty.
             let rests = pieces.next(|| {
                 let rests: Option<Vec<Vec<f64>>> =
                     own.par_iter().map(of_the_rest).collect::<Result<_, Stop>>()?;

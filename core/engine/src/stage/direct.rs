@@ -239,21 +239,29 @@ impl<'a> ModelMap<'a> {
         self.note(self.simulator.with_derivatives(setting, gradient, point))
     }
 
-    /// Response, and derivatives by central differences; one-sided if the model can be evaluated on one side only.
+    /// Response, and derivatives by central differences; one-sided at an end of a prior, outside of which the model is not
+    /// evaluated, and where the model can be evaluated on one side only.
     fn differences(&self, point: &[f64], columns: &[usize]) -> (Vec<f64>, Matrix) {
         let steps: Vec<f64> = columns.iter().map(|&j| step(&self.priors[j], point[j])).collect();
         let mut around = vec![point.to_vec()];
+        // Row of the responses on either side.
+        let mut rows = Vec::with_capacity(columns.len());
         for (&j, step) in columns.iter().zip(&steps) {
-            for sign in [1.0, -1.0] {
+            let (low, high) = self.priors[j].support();
+            rows.push([1.0, -1.0].map(|sign| {
                 let mut moved = point.to_vec();
                 moved[j] += sign * step;
-                around.push(moved);
-            }
+                (low..=high).contains(&moved[j]).then(|| {
+                    around.push(moved);
+                    around.len() - 1
+                })
+            }));
         }
         // Differences of a stochastic response are those between runs with the same random numbers.
         let responses = self.runs(&Matrix::from_rows(point.len(), around), 1, Numbers::Common(0));
         let slope = |i: usize, j: usize| {
-            let [here, above, below] = [0, 2 * j + 1, 2 * j + 2].map(|row| responses[(row, i)]);
+            let [above, below] = rows[j].map(|row| row.map_or(f64::NAN, |row| responses[(row, i)]));
+            let here = responses[(0, i)];
             match (above.is_finite(), below.is_finite()) {
                 (true, true) => (above - below) / (2.0 * steps[j]),
                 (true, false) => (above - here) / steps[j],

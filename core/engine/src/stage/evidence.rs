@@ -54,7 +54,7 @@ pub fn stage(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Kept<Weighed>, Stop> {
-    observer.begin(Stage::Evidence.label(), "part", 0);
+    observer.begin(Stage::Evidence.label(), "piece", 0);
     let faults = run.watched().to_vec();
     let kept = run.keep(
         &Stage::Evidence.folder(),
@@ -123,7 +123,7 @@ fn bridged(
         Err(reason) => return Ok(Err(reason)),
     };
     let count = bridge.count();
-    pieces.expect(count.div_ceil(TOGETHER));
+    pieces.announce(count.div_ceil(TOGETHER));
     let mut densities = Vec::with_capacity(count);
     for first in (0..count).step_by(TOGETHER) {
         let some = first..count.min(first + TOGETHER);

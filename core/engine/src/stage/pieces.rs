@@ -1,8 +1,8 @@
-//! Parts of a stage's result that are computed one after the other and kept in a file as they come: an interrupted stage
-//! continues with the first part that is missing, and its result has the same bits.
+//! Pieces of a stage's result that are computed one after the other and kept in a file as they come: an interrupted stage
+//! continues with the first piece that is missing, and its result has the same bits.
 //!
-//! The order of the parts, and what each is computed from, depend on the inputs of the stage alone, which the run directory
-//! compares. Where they are computed within a second, no file is written.
+//! The order of the pieces, and what each is computed from, depend on the inputs of the stage alone, which the run directory
+//! compares; a change of the order in this program needs a new revision of the stage. Where they are computed within a second, no file is written.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Write as _;
@@ -12,28 +12,28 @@ use std::time::{Duration, Instant};
 
 use lacuna::run::{Fault, Observer, Stop, files};
 
-/// File of the parts in the folder of an unfinished stage.
+/// File of the pieces in the folder of an unfinished stage.
 const FILE: &str = "pieces.bin";
 
 /// Interval between writes.
 const INTERVAL: Duration = Duration::from_secs(1);
 
-/// Number of bytes of a length, of a number, and of the check of a part.
+/// Number of bytes of a length, of a number, and of the check of a piece.
 const WORD: usize = 8;
 
-/// The parts of a result, in their order.
+/// The pieces of a result, in their order.
 pub struct Pieces<'a> {
-    /// Parts that an earlier attempt has left.
+    /// Pieces that an earlier attempt has left.
     known: std::vec::IntoIter<Vec<f64>>,
-    /// Number of parts so far.
+    /// Number of pieces so far.
     count: u64,
     log: Option<Log>,
-    /// A part computed after one of these faults has no meaning.
+    /// A piece computed after one of these faults has no meaning.
     faults: &'a [Arc<Fault>],
     progress: Option<(&'a dyn Observer, u64)>,
 }
 
-/// The file, and the parts that are not yet in it.
+/// The file, and the pieces that are not yet in it.
 struct Log {
     path: PathBuf,
     file: Option<File>,
@@ -42,7 +42,7 @@ struct Log {
 }
 
 impl<'a> Pieces<'a> {
-    /// The parts of a stage with this folder: those that an earlier attempt has left, and new ones. The observer is told of
+    /// The pieces of a stage with this folder: those that an earlier attempt has left, and new ones. The observer is told of
     /// each of them.
     pub fn open(
         folder: &Path,
@@ -67,44 +67,44 @@ impl<'a> Pieces<'a> {
         })
     }
 
-    /// Parts that are kept nowhere.
+    /// Pieces that are kept nowhere.
     pub fn unkept() -> Self {
         Self { known: Vec::new().into_iter(), count: 0, log: None, faults: &[], progress: None }
     }
 
-    /// Announces further parts.
-    pub fn expect(&mut self, further: usize) {
+    /// Announces further pieces.
+    pub fn announce(&mut self, further: usize) {
         if let Some((observer, expected)) = &mut self.progress {
             *expected += further as u64;
             observer.expect(*expected);
         }
     }
 
-    /// The next part: as an earlier attempt has left it, or made.
+    /// The next piece: as an earlier attempt has left it, or made.
     pub fn next(
         &mut self,
         make: impl FnOnce() -> Result<Vec<f64>, Stop>,
     ) -> Result<Vec<f64>, Stop> {
-        let part = match self.known.next() {
-            Some(part) => part,
+        let piece = match self.known.next() {
+            Some(piece) => piece,
             None => self.made(make)?,
         };
         self.count += 1;
         if let Some((observer, _)) = self.progress {
             observer.advance(1);
         }
-        Ok(part)
+        Ok(piece)
     }
 
     fn made(&mut self, make: impl FnOnce() -> Result<Vec<f64>, Stop>) -> Result<Vec<f64>, Stop> {
-        let part = make()?;
+        let piece = make()?;
         if let Some(said) = self.faults.iter().find_map(|fault| fault.said()) {
             return Err(Stop::new(said));
         }
         if let Some(log) = &mut self.log {
-            log.append(self.count, &part)?;
+            log.append(self.count, &piece)?;
         }
-        Ok(part)
+        Ok(piece)
     }
 
     /// Removes the file: the stage has its result.
@@ -115,10 +115,10 @@ impl<'a> Pieces<'a> {
 }
 
 impl Log {
-    fn append(&mut self, index: u64, part: &[f64]) -> Result<(), Stop> {
-        self.pending.extend_from_slice(&(part.len() as u64).to_le_bytes());
+    fn append(&mut self, index: u64, piece: &[f64]) -> Result<(), Stop> {
+        self.pending.extend_from_slice(&(piece.len() as u64).to_le_bytes());
         let begin = self.pending.len();
-        self.pending.extend(part.iter().flat_map(|value| value.to_le_bytes()));
+        self.pending.extend(piece.iter().flat_map(|value| value.to_le_bytes()));
         let check = check(index, &self.pending[begin..]);
         self.pending.extend_from_slice(&check);
         if self.written.elapsed() < INTERVAL {
@@ -140,7 +140,7 @@ impl Log {
     }
 }
 
-/// Eight characters of the hash of a part at its place.
+/// Eight characters of the hash of a piece at its place.
 fn check(index: u64, values: &[u8]) -> [u8; WORD] {
     let hash = files::hash(&[&index.to_le_bytes()[..], values].concat());
     let mut check = [0; WORD];
@@ -148,18 +148,18 @@ fn check(index: u64, values: &[u8]) -> [u8; WORD] {
     check
 }
 
-/// The parts in a file up to the first that is cut or damaged, and the number of their bytes.
+/// The pieces in a file up to the first that is cut or damaged, and the number of their bytes.
 fn read(bytes: &[u8]) -> (Vec<Vec<f64>>, usize) {
-    let (mut parts, mut rest) = (Vec::new(), bytes);
-    while let Some((values, after)) = first(rest, parts.len() as u64) {
+    let (mut pieces, mut rest) = (Vec::new(), bytes);
+    while let Some((values, after)) = first(rest, pieces.len() as u64) {
         let (words, _) = values.as_chunks::<WORD>();
-        parts.push(words.iter().map(|&word| f64::from_le_bytes(word)).collect());
+        pieces.push(words.iter().map(|&word| f64::from_le_bytes(word)).collect());
         rest = after;
     }
-    (parts, bytes.len() - rest.len())
+    (pieces, bytes.len() - rest.len())
 }
 
-/// Bytes of the values of the first part, and what follows it.
+/// Bytes of the values of the first piece, and what follows it.
 fn first(bytes: &[u8], index: u64) -> Option<(&[u8], &[u8])> {
     let (length, rest) = bytes.split_first_chunk::<WORD>()?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok()?.checked_mul(WORD)?;
@@ -174,53 +174,53 @@ mod tests {
 
     use super::*;
 
-    /// Three parts as a file has them.
+    /// Three pieces as a file has them.
     fn file() -> (Vec<Vec<f64>>, Vec<u8>) {
-        let parts = vec![vec![1.0, f64::NAN, -0.0], vec![], vec![f64::INFINITY]];
+        let pieces = vec![vec![1.0, f64::NAN, -0.0], vec![], vec![f64::INFINITY]];
         let mut log = Log {
             path: PathBuf::from("unused"),
             file: None,
             pending: Vec::new(),
             written: Instant::now() + Duration::from_secs(3600),
         };
-        for (i, part) in parts.iter().enumerate() {
-            log.append(i as u64, part).unwrap();
+        for (i, piece) in pieces.iter().enumerate() {
+            log.append(i as u64, piece).unwrap();
         }
-        (parts, log.pending)
+        (pieces, log.pending)
     }
 
-    fn bits(parts: &[Vec<f64>]) -> Vec<Vec<u64>> {
-        parts.iter().map(|part| part.iter().map(|value| value.to_bits()).collect()).collect()
+    fn bits(pieces: &[Vec<f64>]) -> Vec<Vec<u64>> {
+        pieces.iter().map(|piece| piece.iter().map(|value| value.to_bits()).collect()).collect()
     }
 
     #[test]
     fn parts_are_read_as_they_were_written() {
-        let (parts, bytes) = file();
+        let (pieces, bytes) = file();
         let (read, sound) = read(&bytes);
-        assert_eq!((bits(&read), sound), (bits(&parts), bytes.len()));
+        assert_eq!((bits(&read), sound), (bits(&pieces), bytes.len()));
     }
 
     #[test]
     fn a_part_that_is_cut_or_damaged_is_left_out_with_all_that_follow() {
-        let (parts, bytes) = file();
-        let ends: Vec<usize> = parts
+        let (pieces, bytes) = file();
+        let ends: Vec<usize> = pieces
             .iter()
-            .scan(0, |end, part| {
-                *end += WORD * (part.len() + 2);
+            .scan(0, |end, piece| {
+                *end += WORD * (piece.len() + 2);
                 Some(*end)
             })
             .collect();
         for cut in 0..bytes.len() {
             let whole = ends.iter().filter(|end| **end <= cut).count();
             let (found, sound) = read(&bytes[..cut]);
-            assert_eq!(bits(&found), bits(&parts[..whole]), "cut at {cut}");
+            assert_eq!(bits(&found), bits(&pieces[..whole]), "cut at {cut}");
             assert_eq!(sound, if whole == 0 { 0 } else { ends[whole - 1] });
         }
         for place in 0..bytes.len() {
             let whole = ends.iter().filter(|end| **end <= place).count();
             let mut damaged = bytes.clone();
             damaged[place] ^= 0x10;
-            assert_eq!(bits(&read(&damaged).0), bits(&parts[..whole]), "damaged at {place}");
+            assert_eq!(bits(&read(&damaged).0), bits(&pieces[..whole]), "damaged at {place}");
         }
     }
 
@@ -234,18 +234,18 @@ mod tests {
     fn an_attempt_continues_with_the_first_part_that_is_missing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(FILE);
-        let (parts, bytes) = file();
-        // The last part is cut.
+        let (pieces, bytes) = file();
+        // The last piece is cut.
         fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
-        let mut pieces = Pieces::open(folder.path(), &[], &Silent).unwrap();
-        for part in &parts[..2] {
-            let found = pieces.next(|| panic!("it is known")).unwrap();
-            assert_eq!(bits(&[found]), bits(std::slice::from_ref(part)));
+        let mut attempt = Pieces::open(folder.path(), &[], &Silent).unwrap();
+        for piece in &pieces[..2] {
+            let found = attempt.next(|| panic!("it is known")).unwrap();
+            assert_eq!(bits(&[found]), bits(std::slice::from_ref(piece)));
         }
-        assert_eq!(pieces.next(|| Ok(vec![3.0])).unwrap(), [3.0]);
-        pieces.log.as_mut().unwrap().write().unwrap();
+        assert_eq!(attempt.next(|| Ok(vec![3.0])).unwrap(), [3.0]);
+        attempt.log.as_mut().unwrap().write().unwrap();
         assert_eq!(read(&fs::read(&path).unwrap()).0[2], [3.0]);
-        pieces.finish().unwrap();
+        attempt.finish().unwrap();
         assert!(!path.exists());
     }
 

@@ -150,7 +150,7 @@ pub fn responses(
     if count * outputs > HELD {
         return Ok(None);
     }
-    pieces.expect(count.div_ceil(TOGETHER));
+    pieces.announce(count.div_ceil(TOGETHER));
     let mut all = Vec::with_capacity(count);
     for rows in blocks(count, TOGETHER) {
         let some = chosen.points.select_rows(&rows);
@@ -212,11 +212,11 @@ fn by_draw(
     let own = p.likelihood.hyperparameters().len();
     let mut all: Option<Matrix> = None;
     let together = TOGETHER.min(VALUES_TOGETHER / p.forward.outputs().max(1)).max(1);
-    pieces.expect(count.div_ceil(together));
+    pieces.announce(count.div_ceil(together));
     for rows in blocks(count, together) {
         let some = chosen.points.select_rows(&rows);
-        // Without densities of left-out data the part is empty.
-        let part = pieces.next(|| {
+        // Without densities of left-out data the piece is empty.
+        let piece = pieces.next(|| {
             let made;
             let at = if let Some(held) = responses {
                 &held[rows[0]..rows[0] + rows.len()]
@@ -230,12 +230,12 @@ fn by_draw(
             let found: Option<Vec<_>> = at.par_iter().enumerate().map(left_out).collect();
             Ok(found.unwrap_or_default().concat())
         })?;
-        if part.is_empty() {
+        if piece.is_empty() {
             return Ok(None);
         }
-        let data = part.len() / rows.len();
+        let data = piece.len() / rows.len();
         let all = all.get_or_insert_with(|| Matrix::zeros(count, data));
-        for (row, density) in rows.iter().zip(part.chunks_exact(data)) {
+        for (row, density) in rows.iter().zip(piece.chunks_exact(data)) {
             all.row_mut(*row).copy_from_slice(density);
         }
     }
