@@ -99,7 +99,7 @@ fn direct(folder: &Path) {
     let sections = text.split_inclusive("\n\n");
     let kept = sections.filter(|section| !parts.iter().any(|part| section.starts_with(part)));
     fs::write(&path, kept.collect::<String>()).unwrap();
-    quick::replace(&path, "walkers = 24\nsteps = 60", "walkers = 8\nsteps = 300");
+    quick::replace(&path, "walkers = 24\nsteps = 60", "walkers = 8\nsteps = 120");
     quick::replace(&path, "emulator_check = 2\n", "");
 }
 

@@ -1,5 +1,5 @@
 //! The stated start of the search for the best fit: a wave over many periods, whose frequency the data know to one part in
-//! 160,000, so that among the draws of the prior none is near.
+//! 57,000, so that among the draws of the prior none is near.
 //!
 //! Truth and data are `sin(f t)` in closed form; the study integrates `x'' = -f^2 x`.
 
@@ -11,8 +11,8 @@ use generator::noise;
 use crate::quick;
 
 const FREQUENCY: f64 = 31.4;
-const POINTS: usize = 1000;
-const LENGTH: f64 = 40.0;
+const POINTS: usize = 500;
+const LENGTH: f64 = 20.0;
 const NOISE: f64 = 0.1;
 
 const STUDY: &str = r#"
@@ -47,8 +47,8 @@ variance = { half_normal = 1.0 }
 
 [sampler]
 use = "no_u_turn"
-warm_up = 30
-steps = 40
+warm_up = 20
+steps = 20
 chains = 2
 "#;
 

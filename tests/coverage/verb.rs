@@ -42,7 +42,7 @@ fn cases(out: &Path) -> String {
 }
 
 /// Half as many steps as in the study: a few hundred effective draws.
-const SHORT: [&str; 1] = ["sampler.steps=1500"];
+pub const SHORT: [&str; 1] = ["sampler.steps=1500"];
 
 /// Closed form: intervals have their nominal coverage, ranks are uniform, and the width of the posterior is known.
 #[test]

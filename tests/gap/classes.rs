@@ -41,7 +41,8 @@ fn the_members_of_a_class_are_run_and_averaged() {
     written(folder.path(), &case);
     let path = folder.path().join("study.toml");
     let settings = [
-        "sampler.steps=150".to_owned(),
+        "sampler.walkers=24".to_owned(),
+        "sampler.steps=120".to_owned(),
         "gap.simulations=99".to_owned(),
         "gap.candidates=[\"delay\", \"low_pass\"]".to_owned(),
     ];

@@ -89,7 +89,7 @@ fn row(name: &str, inside: usize, of: usize) {
 #[test]
 fn the_interval_of_the_share_closed_holds_the_truth() {
     chain::prepare();
-    let of = count(2000, 150);
+    let of = count(2000, 80);
     println!(
         "\n### The interval of the share closed\n\n| case | inside | 99 % band |\n|---|---|---|"
     );

@@ -28,13 +28,13 @@ fn copied(folder: &Path) -> PathBuf {
 fn a_hidden_effect_is_found_added_and_shown_to_close_the_gap() {
     let folder = tempfile::tempdir().unwrap();
     let path = copied(folder.path());
-    let checked = resolve::load(&path, &["sampler.steps=200".to_owned()]);
+    let checked = resolve::load(&path, &["sampler.steps=120".to_owned()]);
     let complaints = checked.complaints();
     let study = checked.study.unwrap_or_else(|| panic!("{complaints}"));
     let mut run = RunDirectory::open(&folder.path().join("runs/base")).unwrap();
     let findings = pipeline::find_gap(&study, &mut run, &Silent).unwrap();
     let gap = findings.gap.as_ref().unwrap();
-    let settings = ["sampler.steps=200".to_owned()];
+    let settings = ["sampler.steps=120".to_owned()];
     let begun = Begun {
         study: &study,
         path: &path,

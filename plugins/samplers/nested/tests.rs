@@ -2,7 +2,7 @@
 
 use super::super::known_evidence::{
     assert_conjugate, assert_effective_size, assert_evidence, assert_shares, assert_support,
-    calibration, informative, peak, regression, run, shells, two_data, unit_cube,
+    calibration, informative, peak, regression, run, runs, shells, two_data, unit_cube,
 };
 use super::*;
 
@@ -32,8 +32,8 @@ fn evidences_in_closed_form_are_found() {
 fn both_shells_are_found_with_the_published_evidence() {
     for (dimension, live, seed) in [(2, 2000, 1), (5, 3000, 2), (10, 4000, 4)] {
         let sampler = with(live);
-        assert_evidence(&format!("shells in {dimension}"), &sampler, &shells(dimension), seed);
-        let (harvest, _) = run(&sampler, &shells(dimension), seed);
+        let name = format!("shells in {dimension}");
+        let harvest = assert_evidence(&name, &sampler, &shells(dimension), seed);
         let right = harvest.points.iter_rows().filter(|x| x[0] > 0.0).count() as f64;
         let share = right / harvest.points.rows() as f64;
         assert!((share - 0.5).abs() < 0.1, "{dimension}: {share}");
@@ -53,10 +53,10 @@ fn separated_peaks_keep_their_shares() {
 #[test]
 fn stated_errors_of_the_evidence_hold() {
     for (name, target) in [("two data", two_data()), ("regression", regression())] {
-        calibration(&with(300), &target, 40).assert_close(name);
+        calibration(&with(300), &target, runs(40)).assert_close(name);
     }
     for (name, target) in [("peak", peak(4, 30.0)), ("founding shape", informative(3))] {
-        calibration(&with(300), &target, 60).assert(name);
+        calibration(&with(300), &target, runs(60)).assert(name);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::known_evidence::{
     Calibration, assert_conjugate, assert_effective_size, assert_evidence, assert_shares,
-    assert_support, calibration, informative, peak, regression, run, shells, two_data,
+    assert_support, calibration, informative, peak, regression, run, runs, shells, two_data,
 };
 use super::*;
 
@@ -38,8 +38,8 @@ fn evidences_in_closed_form_are_found() {
 fn both_shells_are_found_with_the_published_evidence() {
     for (dimension, particles) in [(2, 2000), (5, 4000), (10, 6000)] {
         let sampler = with(particles);
-        assert_evidence(&format!("shells in {dimension}"), &sampler, &shells(dimension), 3);
-        let (harvest, _) = run(&sampler, &shells(dimension), 3);
+        let name = format!("shells in {dimension}");
+        let harvest = assert_evidence(&name, &sampler, &shells(dimension), 3);
         let right = harvest.points.iter_rows().filter(|x| x[0] > 0.0).count() as f64;
         let share = right / particles as f64;
         // Half of the mass is on either side; the effective size tells how accurately the particles give it.
@@ -67,17 +67,17 @@ fn stated_errors_of_the_evidence_hold() {
         ("shells", shells(2), 500),
         ("shells in five dimensions", shells(5), 1000),
     ] {
-        calibration(&with(particles), &target, 40).assert_close(name);
+        calibration(&with(particles), &target, runs(40)).assert_close(name);
     }
 }
 
 #[test]
 fn the_evidence_of_posteriors_as_concentrated_as_the_founding_one_is_found() {
     // As the power grows, the unknown variance and the misfit decrease together through a funnel.
-    for (name, unknowns, particles, runs) in
+    for (name, unknowns, particles, of_a_night) in
         [("two unknowns", 1, 1000, 40), ("four", 3, 1000, 40), ("ten", 9, 1000, 20)]
     {
-        calibration(&with(particles), &informative(unknowns), runs).assert_close(name);
+        calibration(&with(particles), &informative(unknowns), runs(of_a_night)).assert_close(name);
     }
 }
 
