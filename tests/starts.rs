@@ -48,7 +48,7 @@ variance = { half_normal = 1.0 }
 [sampler]
 use = "no_u_turn"
 warm_up = 20
-steps = 20
+steps = 40
 chains = 2
 "#;
 
