@@ -54,6 +54,7 @@ mod screening;
 mod sequential;
 mod skeletons;
 mod slurm;
+mod spread;
 mod starts;
 mod stated_noise;
 mod stochastic;

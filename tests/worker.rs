@@ -26,7 +26,8 @@ fn main() -> ExitCode {
         parallel: after("--parallel").unwrap_or(1),
         limits: Limits::default(),
     };
-    match work(&assignment, &with_model, &mut std::io::stdin().lock(), &mut std::io::stdout()) {
+    let mut input = std::io::BufReader::new(std::io::stdin());
+    match work(&assignment, &with_model, &mut input, &mut std::io::stdout()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(stop) => {
             eprintln!("{stop}");

@@ -37,5 +37,6 @@ pub fn run(asked: &Work) -> anyhow::Result<()> {
         parallel: asked.parallel.get(),
         limits: Limits { part: asked.part, memory: asked.memory },
     };
-    Ok(work(&assignment, &with_model, &mut std::io::stdin().lock(), &mut std::io::stdout())?)
+    let mut input = std::io::BufReader::new(std::io::stdin());
+    Ok(work(&assignment, &with_model, &mut input, &mut std::io::stdout())?)
 }

@@ -16,7 +16,7 @@ use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, permutation, uniform};
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Emulator, Forward};
-use lacuna::run::{Progress, Silent};
+use lacuna::run::{Progress, Silent, Tasks};
 use lacuna_bench::clock::processor_seconds;
 use lacuna_linalg::Matrix;
 use lacuna_plugins::surrogates::gaussian_process::GaussianProcess;
@@ -142,7 +142,8 @@ impl Case<'_> {
             ..GaussianProcess::default()
         };
         let (begun, before) = (Instant::now(), processor_seconds()?);
-        let emulator = plugin.krige(&training, &Stream::root(1), &Progress::new(&Silent))?;
+        let emulator =
+            plugin.krige(&training, &Stream::root(1), &Progress::new(&Silent), Tasks::here())?;
         let (wall, cpu) = (begun.elapsed().as_secs_f64(), processor_seconds()? - before);
         let begun = processor_seconds()?;
         let mean = emulator.mean(fresh);

@@ -31,7 +31,7 @@ use crate::stage::direct::Direct;
 use crate::stage::emulated::Emulated;
 use crate::stage::evidence::Weighed;
 use crate::stage::inverse_problem::InverseProblem;
-use crate::stage::more_runs::within;
+use crate::stage::more_runs::{Intervals, within};
 use crate::stage::predictions::{Predicting, Predictor};
 use crate::stage::surrogate::Fitting;
 use crate::stage::{
@@ -214,18 +214,10 @@ pub fn emulate(
     observer: &dyn Observer,
 ) -> Result<Emulated, Stop> {
     companion::build_added(study)?;
-    // Runs and emulator know no groups.
+    let (data, region) = runs_to_fit(study, run, observer)?;
     let trained = study.trained();
-    let placed = design::stage(trained, run, observer)?;
-    let simulated = simulate::stage(trained, placed.as_ref(), run, observer)?;
-    let data = read::stage(study, simulated.as_ref(), run, observer)?;
-    let data = low_fidelity::stage(study, placed.as_ref(), data, run, observer)?;
-    let (data, region) = sequential::stage(study, data, run, observer)?;
     let near = region.as_ref().map(|place| within(&trained.parameters, place));
-    let fitting = match (&region, &near) {
-        (Some(place), Some(near)) => Fitting::inside(trained, data.value.runs()?, place, near),
-        _ => Fitting::of(trained, data.value.runs()?)?,
-    };
+    let fitting = Fitting::over(trained, data.value.runs()?, region.as_deref(), near.as_deref())?;
     let fitted = surrogate::stage(trained, &data, &fitting, run, observer)?;
     let (folders, place) = (numerical_error::folders(), region.as_deref());
     let numerics = numerical_error::stage(trained, &data, place, &folders, run, observer)?;
@@ -235,6 +227,31 @@ pub fn emulate(
     emulated.region = region;
     runs::build_added(study, &emulated.problem(), run, observer)?;
     Ok(emulated)
+}
+
+/// The runs of a study with a surrogate, and the region of those to which it is fitted if that is not all of them.
+fn runs_to_fit(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<(Kept<read::Data>, Option<Intervals>), Stop> {
+    // Runs and emulator know no groups.
+    let trained = study.trained();
+    let placed = design::stage(trained, run, observer)?;
+    let simulated = simulate::stage(trained, placed.as_ref(), run, observer)?;
+    let data = read::stage(study, simulated.as_ref(), run, observer)?;
+    let data = low_fidelity::stage(study, placed.as_ref(), data, run, observer)?;
+    sequential::stage(study, data, run, observer)
+}
+
+/// Hands over the tasks of the fit of a surrogate, in a process that is asked for some of them, as a model.
+pub fn surrogate_elsewhere(visit: &Visit, then: Then<'_>) -> Result<(), Stop> {
+    let (study, mut run) = (&visit.study, visit.directory()?);
+    let (data, region) = runs_to_fit(study, &mut run, &Silent)?;
+    let trained = study.trained();
+    let near = region.as_ref().map(|place| within(&trained.parameters, place));
+    let fitting = Fitting::over(trained, data.value.runs()?, region.as_deref(), near.as_deref())?;
+    surrogate::elsewhere(visit, &data, &fitting, &mut run, then)
 }
 
 /// Stages of a study with a surrogate up to the posterior, which exists if the study has measurements.

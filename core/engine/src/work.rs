@@ -18,6 +18,9 @@ pub fn with_model(order: &Recipe, folder: &Path, then: Then<'_>) -> Result<(), S
         None => then(&*order.build(&library::load)?),
         Some(visit) if visit.stage == Stage::Coverage => coverage::elsewhere(&visit, then),
         Some(visit) if visit.stage == Stage::Power => pipeline::power_elsewhere(&visit, then),
+        Some(visit) if visit.stage == Stage::Surrogate => {
+            pipeline::surrogate_elsewhere(&visit, then)
+        }
         Some(visit) => Err(Stop::new(format!("the stage `{}` has no cases", visit.stage.folder()))),
     }
 }

@@ -6,7 +6,7 @@ pub(super) mod tests;
 use lacuna::math::random::Stream;
 use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::plugin::{Component, Context, Emulator};
-use lacuna::run::{Progress, Stop};
+use lacuna::run::{Progress, Stop, Tasks};
 use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -138,11 +138,12 @@ impl GaussianProcess {
         training: &Training<'_>,
         stream: &Stream,
         progress: &Progress<'_>,
+        tasks: Tasks<'_>,
     ) -> Result<Kriging, Stop> {
         let trends = |standards: &[Standard], scores: &lacuna_linalg::Matrix| {
             Ok(Trends::all(self.regressors(standards), scores.columns()))
         };
-        self.settings().fit(training, trends, stream, progress)
+        self.settings().fit(training, trends, stream, progress, tasks)
     }
 }
 
@@ -159,7 +160,17 @@ impl Surrogate for GaussianProcess {
         stream: &Stream,
         progress: &Progress<'_>,
     ) -> Result<Box<dyn Emulator>, Stop> {
-        Ok(Box::new(self.krige(training, stream, progress)?))
+        self.fit_with_tasks(training, stream, progress, Tasks::here())
+    }
+
+    fn fit_with_tasks(
+        &self,
+        training: &Training<'_>,
+        stream: &Stream,
+        progress: &Progress<'_>,
+        tasks: Tasks<'_>,
+    ) -> Result<Box<dyn Emulator>, Stop> {
+        Ok(Box::new(self.krige(training, stream, progress, tasks)?))
     }
 
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop> {

@@ -3,7 +3,7 @@
 use lacuna::data::{Axis, Layout, Layouts, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Forward;
-use lacuna::run::Silent;
+use lacuna::run::{Silent, Tasks};
 use lacuna_linalg::Matrix;
 
 use super::*;
@@ -102,8 +102,9 @@ fn errors_are_not_above_those_of_a_peer() {
         for (kernel, peer) in kernels.into_iter().zip(peers) {
             let bounds = Bounds { nugget: [1e-14, 1.0], ..Bounds::default() };
             let options = GaussianProcess { kernel, bounds, ..GaussianProcess::default() };
-            let emulator =
-                options.krige(&case.training(), &Stream::root(1), &Progress::new(&Silent)).unwrap();
+            let emulator = options
+                .krige(&case.training(), &Stream::root(1), &Progress::new(&Silent), Tasks::here())
+                .unwrap();
             let error = rmse(&emulator.mean(&case.fresh), &case.exact)[0];
             assert!(error < 1.05 * peer, "{kernel:?}: {error} {peer}");
         }
@@ -117,8 +118,9 @@ fn the_variance_covers_the_error() {
     for trend in [Trend::Constant, Trend::Linear] {
         let case = Case::new(3, ishigami);
         let options = GaussianProcess { trend, ..GaussianProcess::default() };
-        let emulator =
-            options.krige(&case.training(), &Stream::root(1), &Progress::new(&Silent)).unwrap();
+        let emulator = options
+            .krige(&case.training(), &Stream::root(1), &Progress::new(&Silent), Tasks::here())
+            .unwrap();
         let (mean, variance) =
             (emulator.mean(&case.fresh), emulator.variance(&case.fresh).unwrap());
         let inside = (0..2000).filter(|&i| {
@@ -138,7 +140,7 @@ fn noise_is_found() {
         *y += 0.2 * lacuna::math::random::normal(&mut rng);
     }
     let emulator = GaussianProcess::default()
-        .krige(&case.training(), &Stream::root(1), &Progress::new(&Silent))
+        .krige(&case.training(), &Stream::root(1), &Progress::new(&Silent), Tasks::here())
         .unwrap();
     // Where runs are dense, the variance of a new run is that of the noise; 100 runs determine it to 1/sqrt(50).
     let variance = emulator.variance(&case.fresh).unwrap();
@@ -185,7 +187,12 @@ fn neighbours_are_some_of_the_other_runs() {
         let approximation = Approximation::Neighbours(neighbours);
         assert_eq!(approximation.fault(Some(100)).is_none(), sound, "{neighbours}");
         let options = GaussianProcess { approximation, starts: 1, ..GaussianProcess::default() };
-        let fitted = options.krige(&case.training(), &Stream::root(1), &Progress::new(&Silent));
+        let fitted = options.krige(
+            &case.training(),
+            &Stream::root(1),
+            &Progress::new(&Silent),
+            Tasks::here(),
+        );
         assert_eq!(fitted.is_ok(), sound, "{neighbours}");
     }
     assert_eq!(Approximation::Automatic.neighbours(2000), None);

@@ -3,7 +3,7 @@
 use lacuna::math::random::Stream;
 use lacuna::plugin::Context;
 use lacuna::plugin::surrogate::{FitError, Training};
-use lacuna::run::{Progress, Stop};
+use lacuna::run::{Progress, Stop, Tasks};
 use lacuna::text::problem::Complaints;
 use lacuna_linalg::{Matrix, multiply};
 use rayon::prelude::*;
@@ -60,6 +60,13 @@ impl Trends {
 /// Standard deviation over the runs, as a fraction of the largest response, below which an output counts as constant.
 const ROUND_OFF: f64 = 1e-13;
 
+/// The progress of a search, counted in outputs.
+#[derive(Clone, Copy)]
+struct Counted<'a> {
+    progress: &'a Progress<'a>,
+    outputs: usize,
+}
+
 impl Settings {
     /// Reports invalid options, and designs for which no standard variable exists.
     pub fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
@@ -90,6 +97,7 @@ impl Settings {
         trends: impl FnOnce(&[Standard], &Matrix) -> Result<Trends, Stop>,
         stream: &Stream,
         progress: &Progress<'_>,
+        tasks: Tasks<'_>,
     ) -> Result<Kriging, Stop> {
         check_numbers(training)?;
         if let Some((key, message)) = self.faults(Some(training.points.rows())).into_iter().next() {
@@ -102,7 +110,8 @@ impl Settings {
         let points = standardised(&standards, training.points);
         let values = regressors.values(training.points);
         let runs = Runs { points: &points, regressors: &values, scores: &scores };
-        let choices = self.choices(runs, &candidates, stream, progress, parts.mean.len())?;
+        let counted = Counted { progress, outputs: parts.mean.len() };
+        let choices = self.choices(runs, &candidates, stream, counted, tasks)?;
         let fields =
             condition(self.kernel, choices, &standards, &regressors, training.points, &scores)
                 .ok_or_else(impossible)?;
@@ -132,8 +141,8 @@ impl Settings {
         runs: Runs<'_>,
         candidates: &[Vec<Vec<usize>>],
         stream: &Stream,
-        progress: &Progress<'_>,
-        outputs: usize,
+        Counted { progress, outputs }: Counted<'_>,
+        tasks: Tasks<'_>,
     ) -> Result<Vec<Choice>, Stop> {
         let groups: Vec<Vec<usize>> = match self.length_scales {
             LengthScales::Each => (0..candidates.len()).map(|c| vec![c]).collect(),
@@ -144,13 +153,15 @@ impl Settings {
             progress.add(outputs as u64);
         }
         let count = groups.len();
-        let choose = |(g, components): (usize, Vec<usize>)| {
+        let choose = |g: usize| {
+            let components = groups[g].clone();
             let trends = &candidates[components[0]];
             let choice = self.choose(runs, components, trends, &stream.at(g as u64));
-            progress.add((outputs * (g + 1) / count - outputs * g / count) as u64);
             choice.ok_or_else(impossible)
         };
-        groups.into_par_iter().enumerate().map(choose).collect()
+        let done =
+            |g: usize| progress.add((outputs * (g + 1) / count - outputs * g / count) as u64);
+        tasks.map(count, &choose, &done)
     }
 
     /// Chooses the best trend of a field, with its hyperparameters: that with the smallest leave-one-out error,

@@ -3,7 +3,7 @@
 use lacuna::math::random::Stream;
 use lacuna::plugin::Emulator;
 use lacuna::plugin::surrogate::Training;
-use lacuna::run::{Progress, Stop};
+use lacuna::run::{Progress, Stop, Tasks};
 use lacuna_linalg::Matrix;
 
 use super::PolynomialChaos;
@@ -29,10 +29,11 @@ pub(super) fn fit(
     training: &Training<'_>,
     stream: &Stream,
     progress: &Progress<'_>,
+    tasks: Tasks<'_>,
 ) -> Result<Expansion, Stop> {
     let Training { points, responses, .. } = training;
     let reduction = options.reduction(points.rows(), responses.columns());
-    fit_with(options, reduction, training, stream, progress)
+    fit_with(options, reduction, training, stream, progress, tasks)
 }
 
 /// Like [`fit`], with components in place of the outputs as stated.
@@ -42,6 +43,7 @@ pub(super) fn fit_with(
     training: &Training<'_>,
     stream: &Stream,
     progress: &Progress<'_>,
+    tasks: Tasks<'_>,
 ) -> Result<Expansion, Stop> {
     check_numbers(training)?;
     let runs = training.points.rows();
@@ -55,6 +57,7 @@ pub(super) fn fit_with(
     let slopes = training.gradients.map(|g| Slopes::new(&coordinates, training.points, g));
     let problem = Problem {
         options,
+        tasks,
         reduction,
         points: training.points,
         coordinates,
@@ -130,6 +133,8 @@ pub(in crate::surrogates) fn check_numbers(training: &Training<'_>) -> Result<()
 /// Data shared by the fits of all outputs.
 pub(super) struct Problem<'a> {
     pub options: &'a PolynomialChaos,
+    /// Place where the paths of the outputs are followed.
+    pub tasks: Tasks<'a>,
     /// Components in place of the outputs.
     pub reduction: Option<Reduction>,
     pub points: &'a Matrix,
@@ -250,6 +255,7 @@ impl Problem<'_> {
     pub fn search(&self) -> Search<'_> {
         Search {
             options: self.options,
+            tasks: self.tasks,
             points: self.points,
             coordinates: &self.coordinates,
             sets: &self.sets,

@@ -46,7 +46,7 @@ use lacuna::data::Parameter;
 use lacuna::math::random::Stream;
 use lacuna::plugin::surrogate::{Summand, Surrogate, Training};
 use lacuna::plugin::{Component, Context, Emulator};
-use lacuna::run::{Progress, Stop};
+use lacuna::run::{Progress, Stop, Tasks};
 use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -319,7 +319,17 @@ impl Surrogate for PolynomialChaos {
         stream: &Stream,
         progress: &Progress<'_>,
     ) -> Result<Box<dyn Emulator>, Stop> {
-        Ok(Box::new(fit::fit(self, training, stream, progress)?))
+        self.fit_with_tasks(training, stream, progress, Tasks::here())
+    }
+
+    fn fit_with_tasks(
+        &self,
+        training: &Training<'_>,
+        stream: &Stream,
+        progress: &Progress<'_>,
+        tasks: Tasks<'_>,
+    ) -> Result<Box<dyn Emulator>, Stop> {
+        Ok(Box::new(fit::fit(self, training, stream, progress, tasks)?))
     }
 
     fn takes_gradients(&self) -> Result<(), String> {

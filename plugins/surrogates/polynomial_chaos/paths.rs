@@ -1,8 +1,7 @@
 //! Search along the paths of least-angle regression: each output goes through all sets of terms by itself, and the path
 //! on a set begins with what it shares with the path on the set before.
 
-use lacuna::run::Progress;
-use rayon::prelude::*;
+use lacuna::run::{Progress, Stop};
 
 use super::dictionary::{Dictionary, Subset};
 use super::judge::best_along;
@@ -15,7 +14,11 @@ const BLOCK: usize = 1024;
 
 impl Search<'_> {
     /// Returns the best terms of each output. `None` for outputs that do not vary, or with which no basis function varies.
-    pub fn along_paths(&self, outputs: &[Output], progress: &Progress<'_>) -> Vec<Option<Best>> {
+    pub fn along_paths(
+        &self,
+        outputs: &[Output],
+        progress: &Progress<'_>,
+    ) -> Result<Vec<Option<Best>>, Stop> {
         let vary: Vec<usize> = (0..outputs.len()).filter(|&o| outputs[o].variance > 0.0).collect();
         progress.add((outputs.len() - vary.len()) as u64);
         let all: Vec<usize> = (0..self.sets.terms.len()).collect();
@@ -27,15 +30,13 @@ impl Search<'_> {
             let centred = self.centred(outputs, block);
             let correlations = dictionary.correlations(&centred);
             let best = |i: usize| {
-                let best =
-                    self.along_sets(&dictionary, &subsets, centred.row(i), correlations.row(i));
-                progress.add(1);
-                best
+                let (centred, correlations) = (centred.row(i), correlations.row(i));
+                Ok(self.along_sets(&dictionary, &subsets, centred, correlations))
             };
-            let of_block: Vec<Option<Best>> = (0..block.len()).into_par_iter().map(best).collect();
+            let of_block = self.tasks.map(block.len(), &best, &|_| progress.add(1))?;
             block.iter().zip(of_block).for_each(|(&o, best)| found[o] = best);
         }
-        found
+        Ok(found)
     }
 
     /// Returns the best terms of one output among all sets.

@@ -3,7 +3,7 @@
 use lacuna::math::random::Stream;
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Component, Emulator, Surrogate};
-use lacuna::run::{Progress, Stop};
+use lacuna::run::{Progress, Stop, Tasks};
 
 use super::PolynomialChaos;
 use super::fit::fit_with;
@@ -32,7 +32,14 @@ impl Surrogate for Rotated {
         stream: &Stream,
         progress: &Progress<'_>,
     ) -> Result<Box<dyn Emulator>, Stop> {
-        Ok(Box::new(fit_with(&self.options, Some(self.reduction), training, stream, progress)?))
+        Ok(Box::new(fit_with(
+            &self.options,
+            Some(self.reduction),
+            training,
+            stream,
+            progress,
+            Tasks::here(),
+        )?))
     }
 
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop> {

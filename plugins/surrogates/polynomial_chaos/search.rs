@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use lacuna::run::{Progress, Stop};
+use lacuna::run::{Progress, Stop, Tasks};
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::PolynomialChaos;
 use super::bayesian::{Parts, bayesian};
@@ -30,7 +31,7 @@ const USELESS: f64 = 0.5;
 const WORSE_NORMS: usize = 2;
 
 /// Terms of one output, and how they were found.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Best {
     pub error: f64,
     pub degree: usize,
@@ -65,6 +66,8 @@ pub(super) struct State {
 /// The search and the data shared by all outputs.
 pub(super) struct Search<'a> {
     pub options: &'a PolynomialChaos,
+    /// Place where the paths of the outputs are followed.
+    pub tasks: Tasks<'a>,
     pub points: &'a Matrix,
     pub coordinates: &'a [Coordinate],
     pub sets: &'a Sets,
@@ -84,7 +87,7 @@ impl Search<'_> {
         progress: &Progress<'_>,
     ) -> Result<Vec<Option<Best>>, Stop> {
         let found = match self.options.solver {
-            Solver::LeastAngleRegression => self.along_paths(outputs, progress),
+            Solver::LeastAngleRegression => self.along_paths(outputs, progress)?,
             _ => self.set_by_set(outputs, progress)?,
         };
         if outputs.iter().zip(&found).any(|(o, best)| o.variance > 0.0 && best.is_none()) {

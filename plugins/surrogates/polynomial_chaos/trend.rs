@@ -3,7 +3,7 @@
 use lacuna::math::random::Stream;
 use lacuna::plugin::Context;
 use lacuna::plugin::surrogate::Training;
-use lacuna::run::{Progress, Stop};
+use lacuna::run::{Progress, Stop, Tasks};
 use lacuna::text::problem::Complaints;
 
 use super::PolynomialChaos;
@@ -18,7 +18,7 @@ impl PolynomialChaos {
         stream: &Stream,
         progress: &Progress<'_>,
     ) -> Result<Expansion, Stop> {
-        fit(self, training, stream, progress)
+        fit(self, training, stream, progress, Tasks::here())
     }
 
     /// Reports errors of the options in a table of another plugin's options.

@@ -7,7 +7,7 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::forward::Linear;
 use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::plugin::{Component, Context, Emulator};
-use lacuna::run::{Progress, Silent, Stop};
+use lacuna::run::{Progress, Silent, Stop, Tasks};
 use lacuna::text::problem::Complaints;
 use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
@@ -111,9 +111,10 @@ impl PolynomialChaosKriging {
         training: &Training<'_>,
         stream: &Stream,
         progress: &Progress<'_>,
+        tasks: Tasks<'_>,
     ) -> Result<Kriging, Stop> {
         let trends = |_: &[Standard], scores: &Matrix| self.trends(training, scores, stream);
-        self.settings().fit(training, trends, stream, progress)
+        self.settings().fit(training, trends, stream, progress, tasks)
     }
 
     /// Returns the polynomials that each component's expansion has chosen.
@@ -177,7 +178,17 @@ impl Surrogate for PolynomialChaosKriging {
         stream: &Stream,
         progress: &Progress<'_>,
     ) -> Result<Box<dyn Emulator>, Stop> {
-        Ok(Box::new(self.krige(training, stream, progress)?))
+        self.fit_with_tasks(training, stream, progress, Tasks::here())
+    }
+
+    fn fit_with_tasks(
+        &self,
+        training: &Training<'_>,
+        stream: &Stream,
+        progress: &Progress<'_>,
+        tasks: Tasks<'_>,
+    ) -> Result<Box<dyn Emulator>, Stop> {
+        Ok(Box::new(self.krige(training, stream, progress, tasks)?))
     }
 
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop> {

@@ -8,9 +8,12 @@ use crate::surrogates::gaussian_process::tests::{Case, ishigami, rmse};
 fn errors(case: &Case) -> [f64; 3] {
     let (stream, progress) = (Stream::root(1), Progress::new(&Silent));
     let training = case.training();
-    let plain = GaussianProcess::default().krige(&training, &stream, &progress).unwrap();
+    let plain =
+        GaussianProcess::default().krige(&training, &stream, &progress, Tasks::here()).unwrap();
     let chaos = PolynomialChaos::default().expand(&training, &stream, &progress).unwrap();
-    let both = PolynomialChaosKriging::default().krige(&training, &stream, &progress).unwrap();
+    let both = PolynomialChaosKriging::default()
+        .krige(&training, &stream, &progress, Tasks::here())
+        .unwrap();
     let error = |emulator: &dyn Emulator| rmse(&emulator.mean(&case.fresh), &case.exact)[0];
     [error(&plain), error(&chaos), error(&both)]
 }

@@ -3,7 +3,7 @@
 use lacuna_base::data::{Layouts, Parameter};
 use lacuna_base::math::random::Stream;
 use lacuna_base::matrix::Matrix;
-use lacuna_base::run::{Progress, Stop};
+use lacuna_base::run::{Progress, Stop, Tasks};
 use serde::{Deserialize, Serialize};
 
 use super::{Component, Fact, Forward};
@@ -17,6 +17,18 @@ pub trait Surrogate: Component {
         stream: &Stream,
         progress: &Progress<'_>,
     ) -> Result<Box<dyn Emulator>, Stop>;
+
+    /// Like [`Surrogate::fit`], with the same bits; what does not depend on each other, such as the searches of the outputs,
+    /// is computed as `tasks`, which other processes may do.
+    fn fit_with_tasks(
+        &self,
+        training: &Training<'_>,
+        stream: &Stream,
+        progress: &Progress<'_>,
+        _tasks: Tasks<'_>,
+    ) -> Result<Box<dyn Emulator>, Stop> {
+        self.fit(training, stream, progress)
+    }
 
     /// Accepts or refuses [`Training::gradients`].
     ///

@@ -6,6 +6,7 @@
 //! computes the case as a thread of that one would.
 
 mod runner;
+mod spread;
 mod task;
 mod visit;
 
@@ -26,6 +27,7 @@ use crate::study::Study;
 use runner::Runner;
 use task::Task;
 
+pub use spread::{Spreading, Visiting};
 pub use visit::Visit;
 
 /// Outcome of a case.
@@ -72,7 +74,7 @@ impl Cases<'_> {
         observer: &dyn Observer,
     ) -> Result<(), Stop> {
         match &self.study.cases {
-            Some(section) if !numbers.is_empty() => {
+            Some(section) if !numbers.is_empty() && section.common.include(self.stage) => {
                 self.submit(&section.built, numbers, make, note, observer)
             }
             _ => numbers.par_iter().try_for_each(|&number| note(number, make(number)?)),

@@ -19,7 +19,11 @@ pub struct Runner<'a, T> {
     pub make: &'a Make<'a, T>,
 }
 
-/// File of an outcome, inside the folder of the stage.
+/// File of the outcome of the case with this number, inside the folder of the stage.
+pub fn file_of(number: usize) -> String {
+    file(&super::job(number).name)
+}
+
 fn file(case: &str) -> String {
     format!("campaign/outcomes/{case}.json")
 }
@@ -36,7 +40,7 @@ impl<T: Outcome> Model for Runner<'_, T> {
         let made = catch_unwind(AssertUnwindSafe(|| (self.make)(number)));
         let made = made.map_err(|panic| EvalError::Rejected(words(&*panic)))?;
         let outcome = made.map_err(|stop| EvalError::Fatal(stop.to_string()))?;
-        let path = self.folder.join(file(&super::job(number).name));
+        let path = self.folder.join(file_of(number));
         files::write_json(&path, &outcome).map_err(|stop| EvalError::Fatal(stop.to_string()))?;
         let values = vec![0.0; call.layout.len()];
         Ok(Response { values, valid: outcome.is_settled(), facts: Vec::new() })

@@ -55,6 +55,23 @@ impl Visit {
         Ok(run)
     }
 
+    /// Folder of the stage.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Refuses inputs of the cases that are not those of the process that asked.
+    pub fn is_of(&self, run: &RunDirectory, inputs: &impl Serialize) -> Result<(), Stop> {
+        if run.hash_of(&self.stage.folder(), inputs)? == self.task.inputs {
+            return Ok(());
+        }
+        let text = format!(
+            "what the cases in {} depend on is not the same here as where they were asked for",
+            self.folder.display()
+        );
+        Err(Stop::new(text).help("files of the study have changed since: run the command again"))
+    }
+
     /// Hands over the cases of the stage, which depend on these inputs, as a model.
     ///
     /// # Errors
@@ -66,14 +83,12 @@ impl Visit {
         make: &Make<'_, T>,
         then: Then<'_>,
     ) -> Result<(), Stop> {
-        if run.hash_of(&self.stage.folder(), inputs)? != self.task.inputs {
-            let text = format!(
-                "what the cases in {} depend on is not the same here as where they were asked for",
-                self.folder.display()
-            );
-            return Err(Stop::new(text)
-                .help("files of the study have changed since: run the command again"));
-        }
+        self.is_of(run, inputs)?;
+        self.hand_over(make, then)
+    }
+
+    /// Hands over the cases of the stage as a model.
+    pub fn hand_over<T: Outcome>(&self, make: &Make<'_, T>, then: Then<'_>) -> Result<(), Stop> {
         let faults = self.study.faults();
         let checked = |number: usize| {
             let made = make(number)?;

@@ -3,7 +3,7 @@
 use lacuna::data::{Ensemble, Parameter};
 use lacuna::plugin::surrogate::{FitError, Training};
 use lacuna::plugin::{Emulator, Fact, Surrogate};
-use lacuna::run::{Observer, Progress, Stop, files};
+use lacuna::run::{Observer, Progress, Stop, Tasks, files};
 use lacuna_linalg::Matrix;
 use lacuna_run::{Kept, RunDirectory, Stage};
 use serde_json::json;
@@ -119,16 +119,17 @@ pub fn fit(
     cheap: Option<(&Matrix, &Matrix)>,
     parameters: &[Parameter],
     progress: &Progress<'_>,
+    tasks: Tasks<'_>,
 ) -> Result<Box<dyn Emulator>, Stop> {
     let no_surrogate = || Stop::new("the study has no surrogate");
     let section = study.surrogate.as_ref().ok_or_else(no_surrogate)?;
     let (own, random) = (&*section.built.plugin, stream(study, "surrogate"));
     let (Some(low), Some((points, responses))) = (&study.low_fidelity, cheap) else {
-        return own.fit(runs, &random, progress);
+        return own.fit_with_tasks(runs, &random, progress, tasks);
     };
     let training =
         Training { parameters, layouts: runs.layouts, points, responses, gradients: None };
-    let emulator = own.fit(&training, &random, progress)?;
+    let emulator = own.fit_with_tasks(&training, &random, progress, tasks)?;
     let (cheap, predicted) = at(&*emulator, points, responses, runs.points);
     let (plugin, _) = of_difference(study, low).ok_or_else(no_surrogate)?;
     let lesson = Lesson {

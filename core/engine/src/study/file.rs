@@ -3,6 +3,7 @@
 //! A section that chooses a plugin with `use` has keys of the engine's, which stand here, beside
 //! the plugin's own options.
 
+mod cases;
 mod sampler;
 
 use std::collections::BTreeMap;
@@ -22,6 +23,7 @@ pub use super::fidelity::{LowFidelitySection, NumericalErrorSection};
 pub use super::hierarchy::{CoordinatesKey, PopulationKeys, ScatterKeys};
 pub use super::noise::{InstrumentNoise, NoiseSection};
 pub use super::scenario::{FunctionSection, ScenarioSection};
+pub use cases::{CasesKeys, CasesOf};
 pub use lacuna::text::quantity::Quantity;
 pub use lacuna::text::response::{Axes, AxisSection, GridSection, ResponseSection};
 pub use sampler::{SamplerKeys, StopRule};

@@ -21,9 +21,9 @@ use toml::Table;
 use super::dependence::{ConstraintSection, DependenceSection};
 use super::field::FieldSection;
 use super::file::{
-    DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, LowFidelitySection, MeasurementKeys,
-    ModelKeys, NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys,
-    ScenarioSection, SimulationKeys, StudySection, SurrogateKeys, ValidateSection,
+    CasesKeys, DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, LowFidelitySection,
+    MeasurementKeys, ModelKeys, NumericalErrorSection, ParameterSection, ResponseSection,
+    SamplerKeys, ScenarioSection, SimulationKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::forward::ForwardSection;
 use super::gap::GapSection;
@@ -142,7 +142,7 @@ sections! {
     model: plugin(Model, ModelKeys);
     design: plugin(Design, DesignKeys);
     executor: plugin(Executor, NoKeys, else "local");
-    cases: plugin(Executor, NoKeys);
+    cases: plugin(Executor, CasesKeys);
     simulations: plugin(Reader, SimulationKeys);
     measurements: plugin(Reader, MeasurementKeys);
     surrogate: plugin(Surrogate, SurrogateKeys);

@@ -42,7 +42,7 @@ struct Worker<'a> {
 }
 
 /// Receives the model of an order.
-pub type Then<'a> = &'a mut dyn FnMut(&dyn Model) -> Result<(), Stop>;
+pub type Then<'a> = &'a mut (dyn FnMut(&dyn Model) -> Result<(), Stop> + Send);
 
 /// Builds the model of an order, whose runs lie in this folder, and hands it over.
 pub type WithModel<'a> = dyn Fn(&Recipe, &Path, Then<'_>) -> Result<(), Stop> + 'a;
@@ -54,8 +54,8 @@ pub type WithModel<'a> = dyn Fn(&Recipe, &Path, Then<'_>) -> Result<(), Stop> + 
 pub fn work(
     assignment: &Assignment,
     with_model: &WithModel<'_>,
-    input: &mut dyn BufRead,
-    output: &mut dyn Write,
+    input: &mut (dyn BufRead + Send),
+    output: &mut (dyn Write + Send),
 ) -> Result<(), Stop> {
     assignment.limits.apply()?;
     let order = Order::read(&assignment.order)?;

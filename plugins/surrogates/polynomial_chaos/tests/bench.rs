@@ -5,7 +5,7 @@ use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, permutation, uniform};
 use lacuna::plugin::Forward;
 use lacuna::plugin::surrogate::Training;
-use lacuna::run::{Progress, Silent, Stop};
+use lacuna::run::{Progress, Silent, Stop, Tasks};
 use lacuna_linalg::Matrix;
 
 use crate::surrogates::polynomial_chaos::{Degree, DegreeRange, Expansion, PolynomialChaos, fit};
@@ -182,7 +182,7 @@ pub fn fitted_to(
 ) -> Result<Expansion, Stop> {
     let layouts = layout(responses.columns()).into();
     let training = Training { parameters, layouts: &layouts, points, responses, gradients: None };
-    fit::fit(options, &training, &Stream::root(1), &Progress::new(&Silent))
+    fit::fit(options, &training, &Stream::root(1), &Progress::new(&Silent), Tasks::here())
 }
 
 impl Function {

@@ -2,10 +2,11 @@
 
 use lacuna::plugin::Surrogate;
 use lacuna::plugin::surrogate::Training;
-use lacuna::run::{Progress, Silent, Stop};
+use lacuna::run::{Progress, Silent, Stop, Tasks};
 
+use super::fit::Fit;
 use super::rotated::Rotated;
-use super::{Fit, Purpose, plugin};
+use super::{Purpose, plugin};
 use crate::stage::emulator_error::{Curves, Runs};
 use crate::stage::stream;
 
@@ -23,7 +24,7 @@ impl Fit<'_> {
         }
         let Some(surrogate) = self.rotating(runs)? else {
             let all = Curves::refitted(runs, |kept, left| {
-                self.emulator(points, responses, kept, left, &Silent)
+                self.emulator(points, responses, kept, left, (Tasks::here(), &Silent))
             })?;
             let whole = shown.len() == points.rows();
             return Ok(all.map(|curves| if whole { curves } else { curves.select(shown) }));

@@ -4,7 +4,7 @@ use lacuna::data::{Layouts, Parameter};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Emulator, Forward};
-use lacuna::run::{Progress, Silent};
+use lacuna::run::{Progress, Silent, Tasks};
 use lacuna_linalg::Matrix;
 
 use super::super::super::{Approximation, Bounds, Kernel, Kriging, Nugget};
@@ -57,7 +57,7 @@ impl Trial {
     fn fit_with(&self, plugin: &GaussianProcess) -> Kriging {
         let Self { parameters, layouts, points, responses, .. } = self;
         let training = Training { parameters, layouts, points, responses, gradients: None };
-        plugin.krige(&training, &Stream::root(1), &Progress::new(&Silent)).unwrap()
+        plugin.krige(&training, &Stream::root(1), &Progress::new(&Silent), Tasks::here()).unwrap()
     }
 
     fn error(&self, emulator: &Kriging) -> f64 {
