@@ -1,5 +1,5 @@
 //! The stated start of the search for the best fit: a wave over many periods, whose frequency the data know to one part in
-//! 57,000, so that among the draws of the prior none is near.
+//! 115,000, so that among the draws of the prior none is near.
 //!
 //! Truth and data are `sin(f t)` in closed form; the study integrates `x'' = -f^2 x`.
 
@@ -12,7 +12,7 @@ use crate::quick;
 
 const FREQUENCY: f64 = 31.4;
 const POINTS: usize = 500;
-const LENGTH: f64 = 20.0;
+const LENGTH: f64 = 40.0;
 const NOISE: f64 = 0.1;
 
 const STUDY: &str = r#"

@@ -7,7 +7,6 @@
 pub mod assess;
 pub mod augment;
 pub mod campaign;
-pub mod cases;
 pub mod compare;
 pub mod coverage;
 pub mod extremes;

@@ -17,7 +17,6 @@ use lacuna_run::progress::Recorded;
 use lacuna_run::work::Then;
 use lacuna_run::{Kept, RunDirectory, Stage};
 
-use crate::cases::Visit;
 use crate::gap::inside::{companion, runs};
 use crate::gap::power::{PowerDesign, Rates, stage as power};
 use crate::gap::report::reliability::power_page;
@@ -27,6 +26,7 @@ use crate::report::findings::Findings;
 use crate::report::stage as report;
 use crate::stage::artifacts::Artifacts;
 use crate::stage::calibrate::Calibrated;
+use crate::stage::cases::Visit;
 use crate::stage::direct::Direct;
 use crate::stage::emulated::Emulated;
 use crate::stage::evidence::Weighed;

@@ -7,10 +7,10 @@ use lacuna::run::Stop;
 use lacuna_run::Stage;
 use lacuna_run::work::Then;
 
-use crate::cases::Visit;
 use crate::coverage;
 use crate::host::library;
 use crate::pipeline;
+use crate::stage::cases::Visit;
 
 /// Builds what an order evaluates, whose jobs have this folder, and hands it over.
 pub fn with_model(order: &Recipe, folder: &Path, then: Then<'_>) -> Result<(), Stop> {

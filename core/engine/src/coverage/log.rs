@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use lacuna::run::{Stop, files};
 
 use super::Tried;
-use crate::cases::Outcome;
+use crate::stage::cases::Outcome;
 
 const FILE: &str = "cases.jsonl";
 

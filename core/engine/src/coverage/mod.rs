@@ -17,7 +17,7 @@ use lacuna_run::{Artifact, RunDirectory, Stage};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::cases::{self, Visit};
+use crate::stage::cases::{self, Visit};
 use crate::study::Study;
 use ground::Ground;
 use log::Log;

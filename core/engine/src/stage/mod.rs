@@ -5,6 +5,7 @@ pub mod assess;
 pub mod best_fit;
 pub mod calibrate;
 mod calls;
+pub mod cases;
 pub mod common_error;
 pub mod contents;
 pub mod curves;

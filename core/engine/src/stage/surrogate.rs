@@ -22,7 +22,7 @@ use super::idle::Used;
 use super::low_fidelity;
 use super::more_runs::is_inside;
 use super::read::Data;
-use crate::cases::{Spreading, Visit, Visiting};
+use crate::stage::cases::{Spreading, Visit, Visiting};
 use crate::study::Study;
 use crate::study::file::InvalidRuns;
 

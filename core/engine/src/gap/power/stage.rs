@@ -12,7 +12,6 @@ use lacuna_run::work::Then;
 use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
 use serde_json::{Value, json};
 
-use crate::cases::{Cases, Outcome, Visit};
 use crate::gap::candidates::{place, sensors};
 use crate::gap::experiment::{Experiment, MeasuredCurve};
 use crate::gap::inside::InsideCandidates;
@@ -23,6 +22,7 @@ use crate::gap::power::{
 use crate::gap::stage as gap;
 use crate::gap::stage::prepared::{PreparedSearch, prepared};
 use crate::gap::stage::search_model::SearchModel;
+use crate::stage::cases::{Cases, Outcome, Visit};
 use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::stream;
 use crate::study::Study;

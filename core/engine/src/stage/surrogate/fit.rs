@@ -37,7 +37,7 @@ fn most_curves(outputs: usize) -> usize {
 pub struct Fit<'a> {
     /// The study.
     pub study: &'a Study,
-    /// Its runs.
+    /// Runs of the study.
     pub data: &'a Data,
     /// The input of the fit.
     pub fitting: &'a Fitting<'a>,
