@@ -18,8 +18,8 @@ pub trait Surrogate: Component {
         progress: &Progress<'_>,
     ) -> Result<Box<dyn Emulator>, Stop>;
 
-    /// Like [`Surrogate::fit`], with the same bits; what does not depend on each other, such as the searches of the outputs,
-    /// is computed as `tasks`, which other processes may do.
+    /// Like [`Surrogate::fit`], with the same bits. Searches that do not depend on each other, such as those of the outputs, are
+    /// `tasks`, which other processes may compute.
     fn fit_with_tasks(
         &self,
         training: &Training<'_>,
