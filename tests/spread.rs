@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::quick;
@@ -163,6 +164,37 @@ fn a_killed_fit_goes_on_with_the_cases_it_has() {
         ends(run(folder.path(), out, cases).args(["--set", "study.seed=6"]));
     }
     assert_same(&there, &here, "another seed");
+}
+
+/// A process that is killed costs the search that it was making: it is told with its reason, and the same command makes that
+/// one again.
+#[test]
+fn a_killed_process_costs_its_own_search() {
+    let folder = study(1000, 12, PROCESSES);
+    let [here, there] = ["here", "there"].map(|name| folder.path().join(name));
+    let executor = "use = \"local\", processes = 2";
+    let mut command = run(folder.path(), &there, Some(executor));
+    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let begun = campaign(&there).join("begun/case00001.json");
+    let process = || {
+        let record: Value = serde_json::from_str(&fs::read_to_string(&begun).ok()?).ok()?;
+        record["process"].as_u64()
+    };
+    let since = Instant::now();
+    while process().is_none() {
+        assert!(since.elapsed() < Duration::from_secs(120), "no case begins");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let number = process().unwrap().to_string();
+    assert!(Command::new("kill").args(["-9", &number]).status().unwrap().success());
+    let ended = child.wait_with_output().unwrap();
+    let text = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(ended.status.code(), Some(1), "{text}");
+    assert!(text.contains("1 of 12 cases have no outcome; `case00001`"), "{text}");
+    assert!(text.contains("ended by signal 9") && outcomes(&there).len() == 11, "{text}");
+    ends(&mut run(folder.path(), &there, Some(executor)));
+    ends(&mut run(folder.path(), &here, None));
+    assert_same(&there, &here, "after a kill");
 }
 
 /// Twelve searches on a cluster, three a job: one array of four tasks. The process that asked is killed while they run.
