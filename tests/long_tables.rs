@@ -1,12 +1,12 @@
 //! Long tables of measurements: what a point takes of memory.
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
-use std::time::Duration;
+use std::process::Command;
 
-use crate::quick;
+use crate::{python, quick};
 
 /// Number of points of each replicate.
 const POINTS: usize = 100;
@@ -30,33 +30,32 @@ fn study(folder: &Path, replicates: usize) {
     fs::write(folder.join("data.csv"), table).unwrap();
 }
 
+/// Runs a command and prints the largest resident memory that the kernel counted for it until its end, in KiB. Reading
+/// `/proc` while it runs would miss what a process takes after the last reading.
+const LARGEST: &str = r"
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+";
+
 /// Largest resident memory of `lacuna check` of such a study, in bytes.
-fn memory(replicates: usize) -> f64 {
+fn memory(python: &OsStr, replicates: usize) -> f64 {
     let folder = tempfile::tempdir().unwrap();
     study(folder.path(), replicates);
-    let mut command = quick::command();
-    command.args(["check", "study.toml"]).current_dir(folder.path());
-    let mut process = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let status = format!("/proc/{}/status", process.id());
-    let mut largest = 0.0_f64;
-    let ended = loop {
-        let text = fs::read_to_string(&status).unwrap_or_default();
-        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-        let number = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
-        largest = largest.max(1024.0 * number.unwrap_or(0.0));
-        if let Some(ended) = process.try_wait().unwrap() {
-            break ended;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    };
-    assert!(ended.success());
-    largest
+    let lacuna = quick::command();
+    let mut command = Command::new(python);
+    command.arg("-c").arg(LARGEST).arg(lacuna.get_program()).args(["check", "study.toml"]);
+    let output = command.current_dir(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    1024.0 * String::from_utf8(output.stdout).unwrap().trim().parse::<f64>().unwrap()
 }
 
 /// A table of 600,000 points is held in at most three times the eight bytes of a number for each.
 #[test]
 fn a_point_of_a_long_table_takes_three_numbers_of_memory() {
+    let Some(python) = python::interpreter("its standard library") else { return };
     let replicates = 6000;
-    let of_a_point = (memory(replicates) - memory(10)) / (replicates * POINTS) as f64;
+    let of_a_point =
+        (memory(&python, replicates) - memory(&python, 10)) / (replicates * POINTS) as f64;
     assert!(of_a_point < 24.0, "{of_a_point} bytes a point");
 }
