@@ -6,11 +6,14 @@
 //! functions. The terms are summed variable by variable, with one multiplication each:
 //! `sum_a psi_a(x_1) sum_b psi_b(x_2) sum_c q_abc psi_c(x_3)`.
 
+use std::ops::Range;
+
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::forward::SumOfSquares;
 use lacuna_linalg::lanes::{LANES, Lanes, sparse_multiply, sparse_products};
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Matrix, gram, multiply_vector};
+use rayon::prelude::*;
 
 use super::coordinate::Coordinate;
 use super::terms::{Basis, Terms};
@@ -54,7 +57,8 @@ impl Squares {
         if terms.len() > MOST_TERMS || size > MOST_EXPONENTS {
             return None;
         }
-        let dense = Expanded::of(basis, sizes.clone(), size, &gram(factor))?.weights;
+        let all = with_constant(terms, dimension);
+        let dense = Products::of(basis, sizes.clone())?.weights(&all, &gram(factor))?;
         let (levels, weights) = nested(&dense, &sizes);
         if 2 * weights.len() > factor.rows() * factor.columns() {
             return None;
@@ -163,43 +167,71 @@ impl Squares {
     }
 }
 
-/// Weights of all exponents up to the largest; the exponent of the last variable varies fastest.
-struct Expanded {
+/// Products of the basis functions of each variable as sums of basis functions.
+struct Products {
+    /// One more than the largest exponent of each variable in a product.
     sizes: Vec<usize>,
     /// [`Family::product`](super::Family::product) of each variable and pair of exponents.
     products: Vec<Vec<Vec<f64>>>,
-    weights: Vec<f64>,
 }
 
-impl Expanded {
-    /// Expands `sum_ij form_ij psi_i psi_j`; the last row and column of `form` belong to the function 1. `None` if a
-    /// family has no short products.
-    fn of(basis: &Basis, sizes: Vec<usize>, size: usize, form: &Matrix) -> Option<Self> {
+/// Number of parts of the exponents of the first variable that threads add up by themselves.
+const PARTS: usize = 16;
+
+impl Products {
+    /// `None` if a family has no short products.
+    fn of(basis: &Basis, sizes: Vec<usize>) -> Option<Self> {
         let products = basis.coordinates().iter().zip(&sizes);
         let products = products.map(|(coordinate, &size)| {
             let count = size / 2 + 1;
             let pair = |k: usize| coordinate.family().product(k / count, k % count);
             (0..count * count).map(pair).collect()
         });
-        let products = products.collect::<Option<_>>()?;
-        let mut expanded = Self { products, weights: vec![0.0; size], sizes };
-        let terms = with_constant(basis.terms(), basis.coordinates().len());
-        for i in 0..terms.len() {
-            for j in 0..=i {
-                let weight = if i == j { form[(i, j)] } else { 2.0 * form[(i, j)] };
-                if weight != 0.0 {
-                    expanded.add(0, 0, weight, terms.term(i), terms.term(j));
+        Some(Self { products: products.collect::<Option<_>>()?, sizes })
+    }
+
+    /// Weights of all exponents up to the largest in `sum_ij form_ij psi_i psi_j`; the exponent of the last variable
+    /// varies fastest. The last of the terms, and row and column of `form`, is the constant. `None` without variables.
+    fn weights(&self, terms: &Terms, form: &Matrix) -> Option<Vec<f64>> {
+        let (first, rest) = self.sizes.split_first()?;
+        let rest: usize = rest.iter().product();
+        let mut weights = vec![0.0; first * rest];
+        let exponents = first.div_ceil(PARTS);
+        // A weight is the sum over all pairs in their order, whichever thread adds it up.
+        weights.par_chunks_mut(exponents * rest).enumerate().for_each(|(part, weights)| {
+            let begin = part * exponents;
+            let range = begin..begin + weights.len() / rest;
+            for i in 0..terms.len() {
+                for j in 0..=i {
+                    let weight = if i == j { form[(i, j)] } else { 2.0 * form[(i, j)] };
+                    if weight != 0.0 {
+                        self.add_between(&range, weight, terms.term(i), terms.term(j), weights);
+                    }
                 }
             }
+        });
+        Some(weights)
+    }
+
+    /// Adds `weight` times the part of the product of two terms with these exponents of the first variable, to the
+    /// weights of these exponents.
+    fn add_between(&self, range: &Range<usize>, weight: f64, a: &[u16], b: &[u16], to: &mut [f64]) {
+        let (m, n) = (usize::from(a[0]), usize::from(b[0]));
+        if m + n < range.start {
+            return;
         }
-        Some(expanded)
+        let from = if m + n < range.end { 0 } else { (m + n - range.end) / 2 + 1 };
+        for r in from..=m.min(n).min((m + n - range.start) / 2) {
+            let share = self.products[0][m * (self.sizes[0] / 2 + 1) + n][r];
+            self.add(1, m + n - 2 * r - range.start, weight * share, (a, b), to);
+        }
     }
 
     /// Adds `weight` times the product of two terms in the variables from `i` on; `block` is the index chosen by the
     /// exponents of the variables before.
-    fn add(&mut self, i: usize, block: usize, weight: f64, a: &[u16], b: &[u16]) {
+    fn add(&self, i: usize, block: usize, weight: f64, (a, b): (&[u16], &[u16]), to: &mut [f64]) {
         if i == a.len() {
-            self.weights[block] += weight;
+            to[block] += weight;
             return;
         }
         let (m, n) = (usize::from(a[i]), usize::from(b[i]));
@@ -207,7 +239,7 @@ impl Expanded {
         let highest = block * self.sizes[i] + m + n;
         for r in 0..=m.min(n) {
             let share = self.products[i][pair][r];
-            self.add(i + 1, highest - 2 * r, weight * share, a, b);
+            self.add(i + 1, highest - 2 * r, weight * share, (a, b), to);
         }
     }
 }
