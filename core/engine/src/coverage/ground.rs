@@ -108,7 +108,8 @@ impl<'a> Ground<'a> {
         }
         let parts = Parts::of(study, measured, &base.problem(0))?;
         let own = parts.likelihood().hyperparameters().len();
-        let hyper = parts.posterior(study, &base.problem(0)).hyperparameters().to_vec();
+        let hyper =
+            parts.uncompressed_posterior(study, &base.problem(0)).hyperparameters().to_vec();
         drop(parts);
         let coordinates = coordinates(study, &hyper, own, noise);
         let fits = fits(study, noise, &base, measured, run, observer)?;

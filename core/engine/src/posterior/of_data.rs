@@ -33,6 +33,20 @@ impl<'a> OfData<'a> {
         effects: Vec<Placed<'a>>,
         likelihood: &'a dyn Likelihood,
     ) -> Self {
+        let mut all = Self::uncompressed(forward, effects, likelihood);
+        if all.effects.is_empty() {
+            let compress = |linear| Some((linear, likelihood.compress(linear)?));
+            all.reduced = forward.linear().and_then(compress);
+        }
+        all
+    }
+
+    /// Combines the parts without compression, which takes longer than a few evaluations.
+    pub fn uncompressed(
+        forward: &'a dyn Forward,
+        effects: Vec<Placed<'a>>,
+        likelihood: &'a dyn Likelihood,
+    ) -> Self {
         let mut hyper = Vec::new();
         let mut placed = Vec::new();
         for effect in effects {
@@ -41,12 +55,8 @@ impl<'a> OfData<'a> {
             placed.push((effect, begin..hyper.len()));
         }
         hyper.extend_from_slice(likelihood.hyperparameters());
-        let reduced = if placed.is_empty() {
-            forward.linear().and_then(|linear| Some((linear, likelihood.compress(linear)?)))
-        } else {
-            None
-        };
-        Self { forward, effects: placed, likelihood, reduced, hyper, populations: Vec::new() }
+        let populations = Vec::new();
+        Self { forward, effects: placed, likelihood, reduced: None, hyper, populations }
     }
 
     /// The same likelihood where some of its unknowns are members of populations, found by `find` among all of them.

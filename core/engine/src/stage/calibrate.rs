@@ -11,6 +11,8 @@ mod predicting;
 mod sample;
 mod slopes;
 
+use std::sync::Arc;
+
 use lacuna::data::{Draws, Observations, Statistics, Unit};
 use lacuna::diagnose::Diagnosis;
 use lacuna::math::distribution::Distribution;
@@ -108,7 +110,7 @@ pub struct Coordinate {
 
 /// Parts of a posterior that outlive the stage.
 pub struct Parts {
-    likelihood: Box<dyn Likelihood>,
+    likelihood: Arc<dyn Likelihood>,
 }
 
 impl Parts {
@@ -118,8 +120,11 @@ impl Parts {
         measured: &Measured,
         problem: &InverseProblem<'_>,
     ) -> Result<Self, Stop> {
-        let law = Law::of(study, measured, problem)?;
-        Self::with(study, |i| law.block(i))
+        let likelihood = problem.likelihood(|| {
+            let law = Law::of(study, measured, problem)?;
+            joint(study, |i| law.block(i))
+        })?;
+        Ok(Self { likelihood })
     }
 
     /// Like [`Self::of`], but with the errors of emulator and numerics at their actual size, for predictions: for
@@ -130,43 +135,27 @@ impl Parts {
         measured: &Measured,
         problem: &InverseProblem<'_>,
     ) -> Result<Self, Stop> {
-        let law = Law::predicting(study, measured, problem)?;
-        let bare = Law::bare(study, &measured.likelihood, problem.forward())?;
-        let unknowns = |law: &dyn Likelihood| law.hyperparameters().len();
-        let block = |i| {
-            let (whole, alone) = (law.block(i)?, bare.block(i)?);
-            if unknowns(&*whole) == unknowns(&*alone) {
-                return Ok(whole);
-            }
-            let sampled = Law::of(study, measured, problem)?.block(i)?;
-            let added = predicting::Added::new(alone, law.errors(i)?, sampled.hyperparameters())?;
-            Ok(Box::new(added) as Box<dyn Likelihood>)
-        };
-        Self::with(study, block)
+        let likelihood = problem.predictive(|| {
+            let law = Law::predicting(study, measured, problem)?;
+            let bare = Law::bare(study, &measured.likelihood, problem.forward())?;
+            let unknowns = |law: &dyn Likelihood| law.hyperparameters().len();
+            joint(study, |i| {
+                let (whole, alone) = (law.block(i)?, bare.block(i)?);
+                if unknowns(&*whole) == unknowns(&*alone) {
+                    return Ok(whole);
+                }
+                let sampled = Law::of(study, measured, problem)?.block(i)?;
+                let unknowns = sampled.hyperparameters();
+                Ok(Box::new(predicting::Added::new(alone, law.errors(i)?, unknowns)?))
+            })
+        })?;
+        Ok(Self { likelihood })
     }
 
     /// The likelihood of data without any common error: the discrepancy alone.
     pub fn bare(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Self, Stop> {
         let law = Law::bare(study, data, forward)?;
-        Self::with(study, |i| law.block(i))
-    }
-
-    fn with(
-        study: &Study,
-        block: impl FnMut(usize) -> Result<Box<dyn Likelihood>, Stop>,
-    ) -> Result<Self, Stop> {
-        let layouts = &study.layouts;
-        let mut likelihoods: Vec<Box<dyn Likelihood>> =
-            (0..layouts.blocks.len()).map(block).collect::<Result<_, _>>()?;
-        let pools = study.pools();
-        if likelihoods.len() == 1 && pools.is_empty() {
-            return Ok(Self { likelihood: likelihoods.remove(0) });
-        }
-        let joint = Joint::new(layouts, likelihoods);
-        let effects = study.placed_effects().into_iter().flat_map(|own| own.hyperparameters());
-        let all: Vec<_> = effects.chain(joint.hyperparameters().iter().cloned()).collect();
-        let besides = hierarchy::unknowns(&pools, &all)?;
-        Ok(Self { likelihood: Box::new(joint.with_besides(besides)) })
+        Ok(Self { likelihood: joint(study, |i| law.block(i))? })
     }
 
     /// The likelihood of all blocks.
@@ -180,10 +169,55 @@ impl Parts {
         study: &'a Study,
         problem: &InverseProblem<'a>,
     ) -> Posterior<'a> {
-        let likelihood = OfData::new(problem.forward(), study.placed_effects(), self.likelihood())
-            .pooled(|all| hierarchy::populations(&study.pools(), all));
+        let effects = study.placed_effects();
+        Self::of_likelihood(
+            study,
+            problem,
+            OfData::new(problem.forward(), effects, self.likelihood()),
+        )
+    }
+
+    /// That posterior where its prior and its coordinates are asked, and its density hardly.
+    pub fn uncompressed_posterior<'a>(
+        &'a self,
+        study: &'a Study,
+        problem: &InverseProblem<'a>,
+    ) -> Posterior<'a> {
+        let (forward, effects) = (problem.forward(), study.placed_effects());
+        Self::of_likelihood(
+            study,
+            problem,
+            OfData::uncompressed(forward, effects, self.likelihood()),
+        )
+    }
+
+    fn of_likelihood<'a>(
+        study: &'a Study,
+        problem: &InverseProblem<'a>,
+        likelihood: OfData<'a>,
+    ) -> Posterior<'a> {
+        let likelihood = likelihood.pooled(|all| hierarchy::populations(&study.pools(), all));
         Posterior::new(study.prior(), likelihood).within(problem.region().map(<[_]>::to_vec))
     }
+}
+
+/// The likelihood of all blocks, given that of each.
+fn joint(
+    study: &Study,
+    block: impl FnMut(usize) -> Result<Box<dyn Likelihood>, Stop>,
+) -> Result<Arc<dyn Likelihood>, Stop> {
+    let layouts = &study.layouts;
+    let mut likelihoods: Vec<Box<dyn Likelihood>> =
+        (0..layouts.blocks.len()).map(block).collect::<Result<_, _>>()?;
+    let pools = study.pools();
+    if likelihoods.len() == 1 && pools.is_empty() {
+        return Ok(likelihoods.remove(0).into());
+    }
+    let joint = Joint::new(layouts, likelihoods);
+    let effects = study.placed_effects().into_iter().flat_map(|own| own.hyperparameters());
+    let all: Vec<_> = effects.chain(joint.hyperparameters().iter().cloned()).collect();
+    let besides = hierarchy::unknowns(&pools, &all)?;
+    Ok(Arc::new(joint.with_besides(besides)))
 }
 
 /// Variance that the forward map itself states for each output where it fits the data best; `None` if it states none.

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use lacuna::data::Observations;
 use lacuna::math::random::Stream;
-use lacuna::plugin::{Emulator, Forward};
+use lacuna::plugin::{Emulator, Forward, Likelihood};
 use lacuna::run::Stop;
 use lacuna_run::Kept;
 
@@ -29,6 +29,9 @@ pub enum Route<'a> {
     Direct(&'a Direct<'a>),
 }
 
+/// A likelihood, or why there is none.
+type Made = Result<Arc<dyn Likelihood>, Stop>;
+
 /// Results that follow from the data and the forward map, each computed on first use.
 #[derive(Default)]
 pub struct Derived {
@@ -36,6 +39,10 @@ pub struct Derived {
     allowances: OnceLock<Vec<Allowance>>,
     /// Least-squares best fit to these data.
     best_fit: OnceLock<BestFit>,
+    /// Likelihood of these data.
+    likelihood: OnceLock<Arc<dyn Likelihood>>,
+    /// Likelihood of these data with which data are predicted.
+    predictive: OnceLock<Arc<dyn Likelihood>>,
 }
 
 /// Data, and a forward map from parameters to responses.
@@ -125,6 +132,17 @@ impl<'a> InverseProblem<'a> {
         Ok(self.derived.best_fit.get_or_init(|| found))
     }
 
+    /// Likelihood of these data, made on first use: the decomposition of common errors takes most of a second for a
+    /// thousand outputs.
+    pub(super) fn likelihood(&self, make: impl FnOnce() -> Made) -> Made {
+        once(&self.derived.likelihood, make)
+    }
+
+    /// Likelihood of these data with which data are predicted, made on first use.
+    pub(super) fn predictive(&self, make: impl FnOnce() -> Made) -> Made {
+        once(&self.derived.predictive, make)
+    }
+
     /// Errors of emulator and numerics that the study's likelihood includes, for these data.
     pub(super) fn allowances(
         &self,
@@ -154,6 +172,14 @@ impl<'a> InverseProblem<'a> {
         }
         Ok(self.derived.allowances.get_or_init(|| found))
     }
+}
+
+fn once(kept: &OnceLock<Arc<dyn Likelihood>>, make: impl FnOnce() -> Made) -> Made {
+    if let Some(found) = kept.get() {
+        return Ok(found.clone());
+    }
+    let made = make()?;
+    Ok(kept.get_or_init(|| made).clone())
 }
 
 /// One of many calibrations of generated data, with its own random streams.
