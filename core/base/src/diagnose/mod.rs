@@ -19,6 +19,7 @@ pub mod leave_one_out;
 pub mod pareto;
 pub mod walkers;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::data::Draws;
@@ -93,8 +94,10 @@ impl Diagnosis {
     /// Diagnoses draws from which the burn-in has been dropped.
     pub fn of(draws: &Draws, ensemble: bool) -> Self {
         let criteria = if ensemble { Criteria::ENSEMBLE } else { Criteria::CHAINS };
-        let coordinates: Vec<Coordinate> =
-            (0..draws.dimension()).map(|j| coordinate(draws, j, ensemble)).collect();
+        let coordinates: Vec<Coordinate> = (0..draws.dimension())
+            .into_par_iter()
+            .map(|j| coordinate(draws, j, ensemble))
+            .collect();
         let mut diagnosis = Self {
             acceptance: walkers::acceptance(draws),
             stranded: Stranded::among(draws),

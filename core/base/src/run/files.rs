@@ -44,6 +44,35 @@ pub fn write_atomic_with(
     write().map_err(|error| cannot_write(path, &error))
 }
 
+/// Like [`write_atomic_with`]; returns the SHA-256 of the file, in hexadecimal, which another thread computes while pieces
+/// are written.
+pub fn write_atomic_hashed(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<String, Stop> {
+    let mut hasher = Sha256::new();
+    write_atomic_with(path, |file| write(&mut Hashing { file, hasher: &mut hasher }))?;
+    Ok(in_hexadecimal(hasher.finalize().as_slice()))
+}
+
+/// A file and the hash of what is written to it.
+struct Hashing<'a> {
+    file: &'a mut BufWriter<File>,
+    hasher: &'a mut Sha256,
+}
+
+impl Write for Hashing<'_> {
+    fn write(&mut self, piece: &[u8]) -> io::Result<usize> {
+        let (file, hasher) = (&mut *self.file, &mut *self.hasher);
+        rayon::join(|| file.write_all(piece), || hasher.update(piece)).0?;
+        Ok(piece.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
 /// The error for a file that cannot be written.
 pub fn cannot_write(path: &Path, error: &io::Error) -> Stop {
     let stop = Stop::new(format!("cannot write {}: {}", path.display(), in_words(error)));
@@ -108,6 +137,13 @@ pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Stop> {
 /// SHA-256 of bytes, in hexadecimal.
 pub fn hash(bytes: &[u8]) -> String {
     in_hexadecimal(Sha256::digest(bytes).as_slice())
+}
+
+/// SHA-256 of bytes that follow each other, in hexadecimal.
+pub fn hash_parts<const N: usize>(parts: [&[u8]; N]) -> String {
+    let mut hasher = Sha256::new();
+    parts.iter().for_each(|part| hasher.update(part));
+    in_hexadecimal(hasher.finalize().as_slice())
 }
 
 /// SHA-256 of a text and of arrays of numbers, in hexadecimal; the text states the sizes of the arrays.

@@ -12,6 +12,7 @@ use lacuna::run::{Observer, Stop, files};
 use lacuna_linalg::Matrix;
 use lacuna_run::directory::Record;
 use lacuna_run::{Kept, RunDirectory, Stage};
+use rayon::prelude::*;
 
 use crate::assess::Assessment;
 use crate::gap::result::{GapFindings, GapResult, added};
@@ -272,7 +273,8 @@ fn calibration(
         Some(_) => Role::Hyperparameter,
     };
     let one = |j: usize| coordinate(calibrated, &kept, j, role(j));
-    let coordinates: Vec<CoordinateFindings> = (0..kept.dimension()).map(one).collect();
+    let coordinates: Vec<CoordinateFindings> =
+        (0..kept.dimension()).into_par_iter().map(one).collect();
     let times: Vec<f64> = coordinates.iter().map(|c| c.autocorrelation_time).collect();
     CalibrationFindings {
         coordinates,

@@ -118,7 +118,9 @@ impl Log {
     fn append(&mut self, index: u64, piece: &[f64]) -> Result<(), Stop> {
         self.pending.extend_from_slice(&(piece.len() as u64).to_le_bytes());
         let begin = self.pending.len();
-        self.pending.extend(piece.iter().flat_map(|value| value.to_le_bytes()));
+        self.pending.resize(begin + WORD * piece.len(), 0);
+        let (words, _) = self.pending[begin..].as_chunks_mut::<WORD>();
+        words.iter_mut().zip(piece).for_each(|(word, value)| *word = value.to_le_bytes());
         let check = check(index, &self.pending[begin..]);
         self.pending.extend_from_slice(&check);
         if self.written.elapsed() < INTERVAL {
@@ -142,7 +144,7 @@ impl Log {
 
 /// Eight characters of the hash of a piece at its place.
 fn check(index: u64, values: &[u8]) -> [u8; WORD] {
-    let hash = files::hash(&[&index.to_le_bytes()[..], values].concat());
+    let hash = files::hash_parts([&index.to_le_bytes()[..], values]);
     let mut check = [0; WORD];
     check.copy_from_slice(&hash.as_bytes()[..WORD]);
     check

@@ -126,7 +126,7 @@ fn efficiency(calibrated: &Calibrated, draws: &Draws, count: usize) -> f64 {
         judged.iter().map(|j| j.ess_bulk).collect()
     } else {
         let of = |j| chains::ess_mean(&draws.coordinate(j).collect::<Vec<_>>());
-        (0..draws.dimension()).map(of).collect()
+        (0..draws.dimension()).into_par_iter().map(of).collect()
     };
     let share = mean(&sizes) / count as f64;
     let thinned = count < draws.len();

@@ -1,5 +1,7 @@
 //! Groups, dimensions and variables of the file.
 
+use std::io::{self, Write};
+
 use lacuna::data::statistics::Kind;
 use lacuna::data::{Coordinates, Layout};
 use netcdf_writer::{
@@ -22,10 +24,14 @@ impl File {
         Ok(file)
     }
 
-    /// Bytes of the file.
-    pub fn bytes(&self) -> Result<Vec<u8>, Error> {
+    /// Writes the file.
+    pub fn write(&self, to: impl Write) -> io::Result<()> {
         let options = NcWriteOptions { format: NcWriteFormat::Nc4 };
-        Ok(self.builder.to_vec(options)?.1)
+        match self.builder.write(to, options) {
+            Ok(_) => Ok(()),
+            Err(Error::Io(error)) => Err(error),
+            Err(other) => Err(io::Error::other(other)),
+        }
     }
 
     /// Sets an attribute of a group.

@@ -38,8 +38,8 @@ const MANY: &str =
     "observed_data is omitted: there are more than ten million data; they are in the folder 3-read";
 
 impl Given<'_> {
-    /// Bytes of the file. The largest tables are given up as soon as they are in the file under construction.
-    pub fn encode(mut self) -> Result<Vec<u8>, Error> {
+    /// The file. The largest tables are given up as soon as they are in the file under construction.
+    pub fn file(mut self) -> Result<File, Error> {
         let version = env!("CARGO_PKG_VERSION");
         let mut attributes = vec![
             ("title", self.study.about.title.as_str()),
@@ -75,7 +75,7 @@ impl Given<'_> {
                 file.describe(group, name, NcAttrValue::Chars(text.to_owned()))?;
             }
         }
-        file.bytes()
+        Ok(file)
     }
 
     fn posterior(&self, file: &mut File) -> Result<(), Error> {

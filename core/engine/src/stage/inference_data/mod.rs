@@ -14,6 +14,7 @@ use lacuna_run::{Kept, RunDirectory, Stage};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use self::file::File;
 use super::calibrate::{Calibrated, Law, Parts};
 use super::derived;
 use super::evidence::Weighed;
@@ -65,7 +66,7 @@ pub fn stage(
     let Some(measured) = &problem.data.value.measured else { return Ok(()) };
     write(study, all, run, || {
         let parts = Parts::of(study, measured, problem)?;
-        let posterior = parts.posterior(study, problem);
+        let posterior = parts.uncompressed_posterior(study, problem);
         let data = &measured.likelihood;
         if !predictions::are_written(&all.calibrated.value, data.count()) {
             return encode(study, all, &posterior, Some(data), None);
@@ -96,7 +97,7 @@ fn write(
     study: &Study,
     all: &Finished<'_>,
     run: &RunDirectory,
-    make: impl FnOnce() -> Result<Vec<u8>, Stop>,
+    make: impl FnOnce() -> Result<File, Stop>,
 ) -> Result<(), Stop> {
     let mut inputs = json!([
         REVISION,
@@ -122,19 +123,19 @@ fn write(
     if files::read_json(&marker).is_ok_and(current) {
         return Ok(());
     }
-    let bytes = make()?;
-    files::write_atomic(&path, &bytes)?;
-    files::write_json(&marker, &Marker { inputs, file: files::hash(&bytes) })
+    let made = make()?;
+    let hash = files::write_atomic_hashed(&path, |to| made.write(to))?;
+    files::write_json(&marker, &Marker { inputs, file: hash })
 }
 
-/// Bytes of the file, with predictions of the data if there is a `predictor`.
+/// The file, with predictions of the data if there is a `predictor`.
 fn encode(
     study: &Study,
     all: &Finished<'_>,
     posterior: &Posterior<'_>,
     data: Option<&Observations>,
     predictor: Option<&Predictor<'_>>,
-) -> Result<Vec<u8>, Stop> {
+) -> Result<File, Stop> {
     let calibrated = &all.calibrated.value;
     let given = groups::Given {
         study,
@@ -149,7 +150,7 @@ fn encode(
         },
         from_prior: predicted::from_prior(study, posterior, predictor)?,
     };
-    given.encode().map_err(|error| Stop::new(format!("cannot write {NAME}: {error}")))
+    given.file().map_err(|error| Stop::new(format!("cannot write {NAME}: {error}")))
 }
 
 /// Suffix that distinguishes the blocks of scenarios in names; empty if there is only one.
