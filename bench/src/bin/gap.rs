@@ -1,10 +1,11 @@
-//! Speed of the gap workflow: `cargo run --release -p lacuna-bench --bin gap`.
+//! Speed of the gap workflow: `cargo run --release -p lacuna-bench --bin gap [-- TIMES]`.
 //!
-//! A case of the founding study's size: ten sensors with a hundred times, twenty replicates, three parameters, a
+//! A case of the founding study's size: ten sensors with a hundred times, or as many as are asked, twenty replicates, three parameters, a
 //! polynomial chaos expansion whose error is of low rank, and an echo hidden on one sensor. All effects of the library
 //! are candidates. Prints wall time and processor time of each stage; quote them together with the load of the machine.
 
 use std::error::Error;
+use std::sync::OnceLock;
 use std::time::Instant;
 
 use lacuna::data::{Axis, Layout, Layouts, Measurements, Observations, Parameter, Replicate, Unit};
@@ -26,7 +27,18 @@ use lacuna_linalg::Matrix;
 use lacuna_plugins as _;
 
 const SENSORS: usize = 10;
-const TIMES: usize = 100;
+
+/// Number of times of each sensor, over ten seconds.
+fn times() -> usize {
+    static ASKED: OnceLock<usize> = OnceLock::new();
+    *ASKED.get_or_init(|| std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(100))
+}
+
+/// Time of a number, in seconds.
+fn time(i: usize) -> f64 {
+    10.0 * i as f64 / times() as f64
+}
+
 const REPLICATES: usize = 20;
 const HELD_OUT: usize = 5;
 const RUNS: usize = 100;
@@ -91,7 +103,7 @@ fn stage<T>(what: &str, call: impl FnOnce() -> T) -> Result<T, Box<dyn Error>> {
 }
 
 fn layouts() -> Result<Layouts, Box<dyn Error>> {
-    let times = (0..TIMES).map(|t| 0.1 * t as f64).collect();
+    let times = (0..times()).map(time).collect();
     let labels: Vec<String> = (0..SENSORS).map(|s| format!("s{s}")).collect();
     let axes = vec![Axis::labels("sensor", labels), Axis::grid("time", times, Unit::parse("s")?)];
     Ok(Layout { name: "y".into(), unit: Unit::dimensionless(), axes }.into())
@@ -117,7 +129,7 @@ fn model(point: &[f64]) -> Vec<f64> {
         let wave = |k: f64| ((1.0 + k) * speed * late).sin() / (1.0 + k) * (-loss * late).exp();
         size * (wave(0.0) + wave(1.3 + 0.1 * s as f64) + 0.2 * (1.0 - (-late).exp()))
     };
-    (0..SENSORS).flat_map(|s| (0..TIMES).map(move |t| value(s, 0.1 * t as f64))).collect()
+    (0..SENSORS).flat_map(|s| (0..times()).map(move |t| value(s, time(t)))).collect()
 }
 
 /// A polynomial chaos expansion with its error, estimated by leaving runs out.
@@ -147,14 +159,15 @@ fn emulator(
 /// Replicates with autoregressive noise and an offset, for a truth with an echo on the fourth sensor.
 fn measured(layouts: &Layouts, replicates: std::ops::Range<usize>) -> Observations {
     let mut truth = model(&[0.4, 0.6, 0.5]);
-    let (begin, lag) = (3 * TIMES, 17);
-    let plain = truth[begin..begin + TIMES].to_vec();
-    for t in lag..TIMES {
+    let times = times();
+    let (begin, lag) = (3 * times, 17 * times / 100);
+    let plain = truth[begin..begin + times].to_vec();
+    for t in lag..times {
         truth[begin + t] += 0.1 * plain[t - lag];
     }
     let replicate = |r: usize| {
         let mut rng = Stream::root(4).at(r as u64).generator();
-        let noisy = truth.chunks(TIMES).flat_map(|curve| {
+        let noisy = truth.chunks(times).flat_map(|curve| {
             let offset = 0.3 * NOISE * normal(&mut rng);
             let mut noise = normal(&mut rng);
             let mut values = Vec::new();

@@ -142,7 +142,9 @@ pub fn hash(bytes: &[u8]) -> String {
 /// SHA-256 of bytes that follow each other, in hexadecimal.
 pub fn hash_parts<const N: usize>(parts: [&[u8]; N]) -> String {
     let mut hasher = Sha256::new();
-    parts.iter().for_each(|part| hasher.update(part));
+    for part in parts {
+        hasher.update(part);
+    }
     in_hexadecimal(hasher.finalize().as_slice())
 }
 
