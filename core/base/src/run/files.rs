@@ -222,6 +222,15 @@ mod tests {
         // FIPS 180-4 example: SHA-256 of "abc".
         let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(hash(b"abc"), expected);
+        assert_eq!(hash_parts([b"a", b"", b"bc"]), expected);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("in_pieces");
+        let pieces = |to: &mut dyn Write| {
+            to.write_all(b"ab")?;
+            to.write_all(b"c")
+        };
+        assert_eq!(write_atomic_hashed(&path, pieces).unwrap(), expected);
+        assert_eq!(read(&path).unwrap(), b"abc");
     }
 
     #[test]
