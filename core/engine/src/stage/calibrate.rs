@@ -114,7 +114,8 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// The likelihood of the study's measurements, with the common errors that the study includes.
+    /// The likelihood of the study's measurements, which are those of the problem, with the common errors that the study
+    /// includes. It is made once for a problem.
     pub fn of(
         study: &Study,
         measured: &Measured,
@@ -145,8 +146,8 @@ impl Parts {
                     return Ok(whole);
                 }
                 let sampled = Law::of(study, measured, problem)?.block(i)?;
-                let unknowns = sampled.hyperparameters();
-                Ok(Box::new(predicting::Added::new(alone, law.errors(i)?, unknowns)?))
+                let own = sampled.hyperparameters();
+                Ok(Box::new(predicting::Added::new(alone, law.errors(i)?, own)?))
             })
         })?;
         Ok(Self { likelihood })

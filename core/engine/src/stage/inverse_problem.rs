@@ -125,22 +125,18 @@ impl<'a> InverseProblem<'a> {
 
     /// Least-squares best fit to these data.
     pub(super) fn best_fit(&self, study: &Study, data: &Observations) -> Result<&BestFit, Stop> {
-        if let Some(found) = self.derived.best_fit.get() {
-            return Ok(found);
-        }
-        let found = best_fit::fitted(study, data, self.forward())?;
-        Ok(self.derived.best_fit.get_or_init(|| found))
+        once(&self.derived.best_fit, || best_fit::fitted(study, data, self.forward()))
     }
 
     /// Likelihood of these data, made on first use: the decomposition of common errors takes most of a second for a
     /// thousand outputs.
     pub(super) fn likelihood(&self, make: impl FnOnce() -> Made) -> Made {
-        once(&self.derived.likelihood, make)
+        once(&self.derived.likelihood, make).cloned()
     }
 
     /// Likelihood of these data with which data are predicted, made on first use.
     pub(super) fn predictive(&self, make: impl FnOnce() -> Made) -> Made {
-        once(&self.derived.predictive, make)
+        once(&self.derived.predictive, make).cloned()
     }
 
     /// Errors of emulator and numerics that the study's likelihood includes, for these data.
@@ -150,36 +146,32 @@ impl<'a> InverseProblem<'a> {
         keys: &DiscrepancyKeys,
         data: &Observations,
     ) -> Result<&[Allowance], Stop> {
-        if let Some(found) = self.derived.allowances.get() {
-            return Ok(found);
-        }
-        let (mut found, forward) = (Vec::new(), self.forward());
-        if let (Some(fitted), true) = (self.fitted(), keys.emulator_error) {
-            let best = self.best_fit(study, data)?;
-            found.push(emulator_error::allowance(
-                study,
-                &fitted.value,
-                Fit { data, forward, point: &best.point },
-            )?);
-        }
-        if let (Some(kept), Some(section)) = (self.numerics(), &study.numerical_error) {
-            let best = self.best_fit(study, data)?;
-            found.push(kept.value.allowance(
-                study,
-                &section.written,
-                Fit { data, forward, point: &best.point },
-            )?);
-        }
-        Ok(self.derived.allowances.get_or_init(|| found))
+        once(&self.derived.allowances, || {
+            let (mut found, forward) = (Vec::new(), self.forward());
+            if let (Some(fitted), true) = (self.fitted(), keys.emulator_error) {
+                let best = self.best_fit(study, data)?;
+                let fit = Fit { data, forward, point: &best.point };
+                found.push(emulator_error::allowance(study, &fitted.value, fit)?);
+            }
+            if let (Some(kept), Some(section)) = (self.numerics(), &study.numerical_error) {
+                let best = self.best_fit(study, data)?;
+                let fit = Fit { data, forward, point: &best.point };
+                found.push(kept.value.allowance(study, &section.written, fit)?);
+            }
+            Ok(found)
+        })
+        .map(Vec::as_slice)
     }
 }
 
-fn once(kept: &OnceLock<Arc<dyn Likelihood>>, make: impl FnOnce() -> Made) -> Made {
+/// The kept result, made on first use; a failure is not kept. `make` runs outside of the lock: it may use the threads of
+/// others that wait for the same result.
+fn once<T>(kept: &OnceLock<T>, make: impl FnOnce() -> Result<T, Stop>) -> Result<&T, Stop> {
     if let Some(found) = kept.get() {
-        return Ok(found.clone());
+        return Ok(found);
     }
     let made = make()?;
-    Ok(kept.get_or_init(|| made).clone())
+    Ok(kept.get_or_init(|| made))
 }
 
 /// One of many calibrations of generated data, with its own random streams.
