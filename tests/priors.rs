@@ -196,7 +196,7 @@ fn a_study_with_dependent_priors_is_calibrated() {
     );
     fs::write(&path, text + &more).unwrap();
     let out = folder.path().join("out");
-    let asked = verb::asked(100, Some(Noise::Prior));
+    let asked = verb::asked(60, Some(Noise::Prior));
     let found = verb::count(folder.path(), &out, &verb::SHORT, &asked).unwrap();
     assert_eq!(found.tally.verdict.word, Word::Nominal, "{}", found.tally.verdict.text);
     assert!(found.tally.rows.iter().all(|row| row.uniform == Some(true)), "{:?}", found.tally.rows);

@@ -1,7 +1,7 @@
 //! Selection and number of the cases.
 
 use generator::{Case, Kind, SENSORS};
-use lacuna_engine::gap::search::MissingEffect;
+use lacuna_engine::gap::search::{MissingEffect, SearchOptions};
 use rayon::prelude::*;
 
 use super::chain::{Answer, ask, prepare};
@@ -35,6 +35,12 @@ fn number(variable: &str, otherwise: u64) -> u64 {
 /// Number of cases: the fraction `of / 126` of `LACUNA_GAP_CASES`, but at least `least`.
 pub fn count(of: u64, least: u64) -> u64 {
     (number("LACUNA_GAP_CASES", 7) * of / 126).max(least)
+}
+
+/// Options of a search: 199 simulations where `LACUNA_GAP_CASES` asks for counts, otherwise half of them.
+pub fn options() -> SearchOptions {
+    let simulations = if std::env::var_os("LACUNA_GAP_CASES").is_some() { 199 } else { 99 };
+    SearchOptions { naming: 0.03, unlisted: 0.02, simulations, most: 3 }
 }
 
 /// Name that a kind should get; its own if it is not in the library.

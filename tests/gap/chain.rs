@@ -23,6 +23,8 @@ use lacuna_engine::gap::system::emulator_error::error_covariance;
 use lacuna_engine::gap::test::Region;
 use lacuna_linalg::Matrix;
 
+use super::cases::options;
+
 const RUNS: usize = 150;
 
 pub fn layouts() -> Layouts {
@@ -148,7 +150,7 @@ fn run<T>(
     let sd = noise.sd(&experiment, &response);
     let situation = Situation { layouts: &layouts, response: &response, noise: &sd };
     let candidates = proposed(names, &[], &situation).unwrap().candidates;
-    let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
+    let options = options();
     let stream = Stream::root(seed);
     let found: SearchResult<'_> =
         search(&experiment, &candidates, &[centre], options, &stream).unwrap();

@@ -12,7 +12,7 @@ use lacuna_engine::gap::edit::Edit;
 use lacuna_engine::gap::experiment::Experiment;
 use lacuna_engine::gap::inside::{Pieces, alternatives, candidates};
 use lacuna_engine::gap::noise::{Noise, ResponseTangents};
-use lacuna_engine::gap::search::{SearchOptions, Verdict, VerdictKind, search, verdict};
+use lacuna_engine::gap::search::{Verdict, VerdictKind, search, verdict};
 use lacuna_engine::gap::system::System;
 use lacuna_engine::gap::system::fit::fit;
 use lacuna_engine::gap::system::whitener::Whitener;
@@ -22,6 +22,8 @@ use lacuna_engine::study::resolve::load_text;
 use lacuna_linalg::Matrix;
 use lacuna_run::RunDirectory;
 use tempfile::TempDir;
+
+use super::cases::options;
 
 const REPLICATES: usize = 8;
 
@@ -134,7 +136,7 @@ fn ask(folder: &TempDir, study: &Study, start: &[f64]) -> (Verdict, Vec<f64>, Ed
     let forward = known.forward();
     let mut experiment = Experiment::new(&study.layouts, &study.parameters, forward, measured);
     experiment.wide = Some(&wide);
-    let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
+    let options = options();
     let starts = [start.to_vec()];
     let found = search(&experiment, &candidates, &starts, options, &Stream::root(5)).unwrap();
     let switches: Vec<&[usize]> =

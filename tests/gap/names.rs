@@ -200,7 +200,7 @@ fn what_is_not_listed_gets_no_name() {
         let sensors = if single { vec![((i / 5 + i) % 4) as usize] } else { (0..4).collect() };
         Plan::new(i, vec![(kind, sensors)], 1.0)
     };
-    let all = asked(4, (0..count(40, 3)).map(plan).collect());
+    let all = asked(4, (0..count(40, 2)).map(plan).collect());
     let unlisted = Rate::of(&all, |a| a.answer.verdict.word == VerdictKind::Unlisted);
     let false_names = Rate::of(&all, named);
     let rows = [unlisted.row("unlisted"), false_names.row("named alone, falsely")];

@@ -10,12 +10,12 @@ use lacuna::plugin::effect::Situation;
 use lacuna_engine::gap::candidates::proposed;
 use lacuna_engine::gap::experiment::Experiment;
 use lacuna_engine::gap::noise::Noise;
-use lacuna_engine::gap::search::{SearchOptions, Verdict, VerdictKind, search, verdict};
+use lacuna_engine::gap::search::{Verdict, VerdictKind, search, verdict};
 use lacuna_engine::gap::system::System;
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
-use super::cases::count;
+use super::cases::{count, options};
 use super::tally::Rate;
 
 /// A level and a decaying exponential.
@@ -94,7 +94,7 @@ fn asked(length: usize, coefficients: &[f64], gap: &dyn Fn(f64) -> f64, seed: u6
     let sd = Noise::of(&experiment, &around, None).sd(&experiment, &around.response);
     let situation = Situation { layouts: &layouts, response: &around.response, noise: &sd };
     let candidates = proposed(None, &[], &situation).unwrap().candidates;
-    let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
+    let options = options();
     let starts = [truth.to_vec()];
     let found = search(&experiment, &candidates, &starts, options, &stream.named("search"));
     verdict(&found.unwrap(), &candidates, options)

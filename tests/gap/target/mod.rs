@@ -103,7 +103,7 @@ fn a_moved_gauge_gets_no_false_name() {
             .sd(experiment, &response);
         let situation = Situation { layouts: experiment.layouts, response: &response, noise: &sd };
         let candidates = candidates(&situation);
-        let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 99, most: 3 };
+        let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 59, most: 3 };
         let starts = [start.to_vec(), vec![1e5, 12_500.0, 1000.0]];
         let found = search(experiment, &candidates, &starts, options, &Stream::root(seed)).unwrap();
         let Verdict { word, effects, reasons, .. } = verdict(&found, &candidates, options);

@@ -74,9 +74,11 @@ impl Hidden {
         let shape = random_shape(kind, random, 1.0);
         let mut hidden = Self { kind, sensors: sensors.to_vec(), size: 0.0, shape };
         let (mut low, mut high) = (0.0, 1e-3);
+        let plain: [Vec<Vec<f64>>; CONDITIONS] =
+            std::array::from_fn(|condition| sampled(&Chain::plain(truth).curves(condition)));
         let change = |hidden: &mut Self, size: f64| {
             hidden.size = sign * size;
-            hidden.change(truth, sd)
+            hidden.change(&plain, truth, sd)
         };
         while change(&mut hidden, high) < ratio && high < 1e4 {
             low = high;
@@ -93,14 +95,13 @@ impl Hidden {
         hidden
     }
 
-    /// Root mean square change of the affected samples, in units of the noise.
-    fn change(&self, truth: [f64; 4], sd: &[f64; 4]) -> f64 {
+    /// Root mean square change of the affected samples from those of the plain chain, in units of the noise.
+    fn change(&self, plain: &[Vec<Vec<f64>>; CONDITIONS], truth: [f64; 4], sd: &[f64; 4]) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
-        for condition in 0..CONDITIONS {
+        for (condition, without) in plain.iter().enumerate() {
             if self.kind == Kind::Burst && condition as f64 != self.shape[2] {
                 continue;
             }
-            let without = sampled(&Chain::plain(truth).curves(condition));
             let with = sampled(&curves(std::slice::from_ref(self), truth, condition));
             for &s in &self.sensors {
                 for (a, b) in with[s].iter().zip(&without[s]) {
