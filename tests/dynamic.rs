@@ -2,6 +2,8 @@
 //! names it.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+#[path = "dynamic/build.rs"]
+mod build;
 #[path = "dynamic/command.rs"]
 mod command;
 #[path = "dynamic/contracts.rs"]
@@ -46,28 +48,6 @@ use lacuna_engine::host::library;
 // Without these lines the linker omits the plugins, and cargo the library.
 use lacuna_plugins as _;
 use lacuna_twin as _;
-
-/// Arguments with which cargo builds a library outside this workspace: one profile for all, so that they share compiled
-/// crates. It is that of the workspace, except that Lacuna's crates and the linear algebra in them are less optimised than in
-/// the program: the interface must hold between such builds, and they are compiled in a third of the time.
-fn with_profile() -> [&'static str; 2] {
-    static PROFILE: OnceLock<String> = OnceLock::new();
-    let path = PROFILE.get_or_init(|| {
-        let manifest = std::fs::read_to_string(quick::root().join("Cargo.toml")).unwrap();
-        let mut manifest: toml::Table = manifest.parse().unwrap();
-        let mut profile = manifest.remove("profile").unwrap();
-        let packages = profile["dev"]["package"].as_table_mut().unwrap();
-        let lacuna = ["lacuna-base", "lacuna-api", "lacuna-abi", "lacuna-linalg"];
-        for part in lacuna.into_iter().chain(["faer"]) {
-            packages.insert(part.to_owned(), toml::Value::from(toml::toml! { opt-level = 0 }));
-        }
-        let all = toml::Table::from_iter([("profile".to_owned(), profile)]);
-        let path = std::env::current_exe().unwrap().with_file_name("profile_of_libraries.toml");
-        lacuna::run::files::write_atomic(&path, all.to_string().as_bytes()).unwrap();
-        path.to_str().unwrap().to_owned()
-    });
-    ["--config", path]
-}
 
 /// Path of the library of twins, which was built together with this test.
 fn twin_path() -> PathBuf {

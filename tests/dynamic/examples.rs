@@ -1,8 +1,8 @@
 //! The examples of plugins outside the source tree, built as their READMEs say, run through the suites and used in
 //! their studies.
 
+use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::OnceLock;
 
 use lacuna::data::{Axis, Layout, Scenario, Unit};
@@ -12,26 +12,26 @@ use lacuna::text::emit;
 use lacuna_engine::host::library;
 use lacuna_engine::study::resolve::{Use, load_for};
 
-use super::{quick, with_profile};
+use super::build::{cargo, product, profile, share_crates};
+use super::quick;
 
-/// The Rust example as a library: a separate workspace that shares compiled crates with this one.
+/// The Rust example as a library. It is a separate workspace; its copy shares compiled crates with this one.
 fn rust() -> &'static Path {
     static BUILT: OnceLock<PathBuf> = OnceLock::new();
     BUILT.get_or_init(|| {
-        let test = std::env::current_exe().unwrap();
-        let profile = test.parent().unwrap().parent().unwrap();
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let mut build = Command::new(cargo);
-        build.args(["build", "--quiet"]).args(with_profile());
-        build.arg("--target-dir").arg(profile.parent().unwrap());
-        build.current_dir(quick::root().join("examples/plugin_rust"));
-        if profile.ends_with("release") {
-            build.arg("--release");
+        let (from, to) =
+            (quick::root().join("examples/plugin_rust"), profile().with_file_name("example"));
+        fs::create_dir_all(to.join("src")).unwrap();
+        for entry in fs::read_dir(from.join("src")).unwrap() {
+            let path = entry.unwrap().path();
+            fs::copy(&path, to.join("src").join(path.file_name().unwrap())).unwrap();
         }
-        assert!(build.status().unwrap().success(), "the example in Rust is not built");
-        let name =
-            format!("{}matern{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
-        profile.join(name)
+        let manifest = fs::read_to_string(from.join("Cargo.toml")).unwrap();
+        let root = format!("path = \"{}/", quick::root().display());
+        fs::write(to.join("Cargo.toml"), manifest.replace("path = \"../../", &root)).unwrap();
+        share_crates(&to);
+        cargo("build", &to);
+        product("matern")
     })
 }
 

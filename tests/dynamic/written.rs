@@ -2,8 +2,7 @@
 //! through the suites of their kinds, and used together in one study.
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::time::Instant;
 
@@ -11,32 +10,13 @@ use lacuna::plugin::registry::{self, Kind};
 use lacuna::plugin::{Design, Discrepancy, Effect, Model, Quantity, Reader, Sampler, Surrogate};
 use lacuna_engine::host::library;
 
+use super::build::{cargo, product, profile, share_crates};
 use super::contracts::{model, reader, sound};
-use super::{quick, with_profile};
+use super::quick;
 
 /// Kinds that libraries can provide.
 const KINDS: [&str; 8] =
     ["design", "discrepancy", "effect", "model", "quantity", "reader", "sampler", "surrogate"];
-
-/// Folder of this test's profile, such as `target/debug`.
-fn profile() -> PathBuf {
-    std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().to_owned()
-}
-
-fn cargo(verb: &str, folder: &Path) -> String {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut cargo = Command::new(cargo);
-    cargo.arg(verb).args(with_profile());
-    cargo.arg("--target-dir").arg(profile().parent().unwrap()).current_dir(folder);
-    if profile().ends_with("release") {
-        cargo.arg("--release");
-    }
-    let output = cargo.output().unwrap();
-    let [out, error] =
-        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-    assert!(output.status.success(), "cargo {verb} in {}\n{out}\n{error}", folder.display());
-    out
-}
 
 /// The libraries, by kind. Each is a crate in its own folder that belongs to no workspace.
 fn written() -> &'static [PathBuf; 8] {
@@ -54,13 +34,11 @@ fn written() -> &'static [PathBuf; 8] {
             lacuna.args(["new", "plugin", kind, &name, "--library"]).arg(&folder);
             let (code, said) = quick::said(lacuna.current_dir(quick::root()));
             assert_eq!(code, Some(0), "{said}");
-            // The versions that have been compiled already.
-            fs::copy(quick::root().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
+            share_crates(&folder);
             cargo("build", &folder);
             let told = cargo("test", &folder);
             assert!(told.contains("it_keeps_the_contract ... ok"), "{told}");
-            let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
-            profile().join(format!("{prefix}{name}{suffix}"))
+            product(&name)
         });
         println!("{} libraries written, built and tested in {:?}", KINDS.len(), begun.elapsed());
         libraries

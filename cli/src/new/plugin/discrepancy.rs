@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use lacuna::data::Measurements;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
-use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Known, VariancePart};
+use lacuna::plugin::discrepancy::{CommonError, Known, VariancePart};
 use lacuna::plugin::{Component, Context, Discrepancy, Hyperparameter, Likelihood};
 use lacuna::run::Stop;
 use lacuna::text::Complaints;
@@ -232,6 +232,7 @@ lacuna::register!(Discrepancy, "skeleton", Skeleton);
 mod tests {
     use super::*;
     use lacuna::data::{Axis, Layout, Replicate, Unit};
+    use lacuna::plugin::discrepancy::ErrorOrigin;
 
     #[test]
     fn it_keeps_the_contract() {
