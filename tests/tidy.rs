@@ -281,6 +281,39 @@ fn doc_comments_begin_with_their_subject() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Returns the examples in doc comments that rustdoc would run: blocks of code that name no other language.
+fn examples(source: &Source) -> Vec<String> {
+    let (mut found, mut is_open) = (Vec::new(), false);
+    for (i, line) in source.text.lines().enumerate() {
+        let line = line.trim_start();
+        let text = line.strip_prefix("///").or_else(|| line.strip_prefix("//!"));
+        let Some(language) = text.and_then(|text| text.trim_start().strip_prefix("```")) else {
+            is_open &= text.is_some();
+            continue;
+        };
+        if !is_open && ["", "rust", "should_panic", "no_run"].contains(&language) {
+            found.push(format!("{}:{}: {line}", source.name, i + 1));
+        }
+        is_open = !is_open;
+    }
+    found
+}
+
+/// A crate without tests of its documentation has no example that they would run.
+#[test]
+fn no_example_is_left_unrun() {
+    let is_without = |folder: &&str| {
+        let manifest = fs::read_to_string(root().join(folder).join("Cargo.toml")).unwrap();
+        manifest.contains("doctest = false")
+    };
+    let folders: Vec<&str> = ARROWS.iter().map(|(folder, _)| *folder).filter(is_without).collect();
+    assert!(folders.contains(&"core/engine"), "{folders:?}");
+    let found: Vec<String> = sources(&folders, "rs").iter().flat_map(examples).collect();
+    none(&found, "examples that no test runs");
+    let run: Vec<String> = sources(&["core/base"], "rs").iter().flat_map(examples).collect();
+    assert!(!run.is_empty(), "the rule finds no example at all");
+}
+
 /// Words of the engine that are also names of plugins.
 const WORDS: [(&str, &str); 9] = [
     // The default executor.
