@@ -87,7 +87,7 @@ impl Stage {
             Self::Surrogate => (4, "surrogate", OnVersion(5)),
             Self::Calibrate => (5, "calibrate", OnVersion(11)),
             Self::Evidence => (6, "evidence", OnVersion(6)),
-            Self::Validate => (6, "validate", OnVersion(7)),
+            Self::Validate => (6, "validate", OnVersion(8)),
             Self::Quantities => (6, "quantities", OnVersion(3)),
             Self::Reliability => (6, "reliability", OnVersion(3)),
             Self::Assess => (6, "assess", OnVersion(12)),

@@ -49,9 +49,8 @@ pub fn ensemble_error(walkers: &[Vec<f64>]) -> f64 {
     if steps < 4 {
         return f64::NAN;
     }
-    let series: Vec<f64> = (0..steps)
-        .map(|t| walkers.iter().map(|w| w[t]).sum::<f64>() / walkers.len() as f64)
-        .collect();
+    let at = |t: usize| mean(&walkers.iter().map(|walker| walker[t]).collect::<Vec<_>>());
+    let series: Vec<f64> = (0..steps).map(at).collect();
     let spread = variance(&series);
     if spread == 0.0 {
         return 0.0;

@@ -1,6 +1,7 @@
 //! Curves computed from draws: histograms, kernel densities, and densities of named distributions.
 
 use lacuna::math::distribution::Distribution;
+use lacuna::math::moments::variance;
 
 /// Histogram with bins of equal width, normalised to area one.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,9 +122,7 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
 
 /// The smaller of the standard deviation and IQR / 1.34, which equals it for a normal distribution.
 fn spread(sorted: &[f64]) -> f64 {
-    let n = sorted.len() as f64;
-    let mean = sorted.iter().sum::<f64>() / n;
-    let sd = (sorted.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+    let sd = variance(sorted).sqrt();
     let iqr = (quantile(sorted, 0.75) - quantile(sorted, 0.25)) / 1.34;
     if iqr > 0.0 { sd.min(iqr) } else { sd }
 }

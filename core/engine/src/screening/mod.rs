@@ -16,6 +16,7 @@ mod tests;
 use std::borrow::Cow;
 use std::ops::Range;
 
+use lacuna::math::moments::mean;
 use lacuna_linalg::Matrix;
 
 pub use self::criterion::Dependence;
@@ -107,9 +108,9 @@ fn scaled(responses: &Matrix, blocks: impl Iterator<Item = Range<usize>>) -> Opt
         let mut variance = 0.0;
         for j in block.clone() {
             let values = responses.column(j);
-            let mean = values.iter().sum::<f64>() / runs;
-            variance += values.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / runs;
-            values.iter().enumerate().for_each(|(i, y)| scaled[(i, j)] = y - mean);
+            let centre = mean(&values);
+            variance += values.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / runs;
+            values.iter().enumerate().for_each(|(i, y)| scaled[(i, j)] = y - centre);
         }
         if !(variance > 0.0 && variance.is_finite()) {
             continue;
@@ -132,8 +133,8 @@ fn scales(responses: &Matrix, blocks: impl Iterator<Item = Range<usize>>) -> Opt
     for block in blocks {
         let of = |j: usize| {
             let values = responses.column(j);
-            let mean = values.iter().sum::<f64>() / runs;
-            values.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / runs
+            let centre = mean(&values);
+            values.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / runs
         };
         let variance: f64 = block.clone().map(of).sum();
         if variance > 0.0 && variance.is_finite() {

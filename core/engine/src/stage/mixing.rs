@@ -1,6 +1,7 @@
 //! How chains mix, as curves: ranks of the draws of each chain among all draws, and autocorrelation.
 
 use lacuna::data::Draws;
+use lacuna::math::moments::mean;
 use rayon::prelude::*;
 
 /// Largest number of coordinates that are described.
@@ -90,8 +91,8 @@ fn autocorrelation(chains: &[&[f64]], time: f64) -> Vec<(usize, f64)> {
     let centred: Vec<Vec<f64>> = chains
         .iter()
         .map(|chain| {
-            let mean = chain.iter().sum::<f64>() / steps.max(1) as f64;
-            chain.iter().map(|x| x - mean).collect()
+            let centre = mean(chain);
+            chain.iter().map(|x| x - centre).collect()
         })
         .collect();
     let lagged = |chain: &[f64], lag: usize| -> f64 {
