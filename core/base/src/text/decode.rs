@@ -7,6 +7,8 @@
 //! An error of a custom visitor or of `try_from` has the form `expected …, found …`, and may end in `; help: …`. A
 //! number may be `inf` or `nan` only for a type that asks for any value (`deserialize_any`).
 
+use std::collections::HashSet;
+
 use serde::de::DeserializeOwned;
 
 use super::nearest::{nearest, one_of};
@@ -36,8 +38,8 @@ pub fn decode_beside<T: DeserializeOwned>(
 ) -> Option<T> {
     let mut repairs = Repairs::default();
     let mut clean = true;
-    // Every iteration leaves out a value or fills a key, so the loop terminates.
-    loop {
+    // Every iteration leaves out a value or fills a key.
+    for _ in 0..MOST {
         match T::deserialize(Decoder::new(node, &repairs)) {
             Ok(decoded) => return clean.then_some(decoded),
             Err(fault) => {
@@ -49,15 +51,20 @@ pub fn decode_beside<T: DeserializeOwned>(
             }
         }
     }
+    problems.report(None, format!("further problems here are not shown, after {MOST}"));
+    None
 }
+
+/// Number of problems of one section after which it is not decoded again.
+const MOST: usize = 500;
 
 /// Values that are left out of a tree or filled in, so that decoding can continue.
 #[derive(Default)]
 struct Repairs {
     /// Values at fault.
-    removed: Vec<*const Node>,
+    removed: HashSet<*const Node>,
     /// Values of unknown keys; nothing follows from their absence.
-    ignored: Vec<*const Node>,
+    ignored: HashSet<*const Node>,
     holes: Vec<(*const Node, String)>,
     /// Known keys that are present under a misspelt name.
     misspelt: Vec<(*const Node, String)>,
@@ -117,7 +124,7 @@ impl Repairs {
                 let meant = nearest(key, known.iter().map(String::as_str));
                 let owner = parents.first().copied();
                 self.misspelt.extend(owner.zip(meant.map(str::to_owned)));
-                self.ignored.push(culprit);
+                self.ignored.insert(culprit);
                 return !parents.is_empty();
             }
             _ if consequence => {}
@@ -125,7 +132,7 @@ impl Repairs {
                 problems.push(problem(&fault, problems, false, beside));
             }
         }
-        self.removed.push(culprit);
+        self.removed.insert(culprit);
         !parents.is_empty()
     }
 }

@@ -1,5 +1,6 @@
 //! Problems of a study: one complaint each, its place, and the correct form.
 
+use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::ops::Range;
 
@@ -7,7 +8,7 @@ use super::node::Node;
 use super::source::{Place, Sources};
 
 /// One problem of a study.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Problem {
     /// Place in the text; `None` if the problem has no particular place.
     pub place: Option<Place>,
@@ -94,7 +95,7 @@ impl Problem {
         }
         let at = sources.position(place);
         let line = sources.line(place).replace('\t', " ");
-        let left = at.column - 1;
+        let (line, left) = excerpt(line.trim_end(), at.column - 1);
         let width = sources.text(place).lines().next().unwrap_or("").trim_end().chars().count();
         let carets = "^".repeat(width.clamp(1, line.chars().count().saturating_sub(left).max(1)));
         let (head, number) = if source.path.is_some() {
@@ -104,7 +105,7 @@ impl Problem {
         };
         let gutter = number.len();
         write_text(text, format_args!("{head}: {}\n{:gutter$} |\n", self.message, ""));
-        write_text(text, format_args!("{number} | {}\n", line.trim_end()));
+        write_text(text, format_args!("{number} | {line}\n"));
         write_text(text, format_args!("{:gutter$} | {:left$}{carets}", "", ""));
         gutter
     }
@@ -123,6 +124,25 @@ impl Problem {
         notes.extend(self.help.iter().map(|help| format!("help: {help}")));
         notes
     }
+}
+
+/// Largest number of problems that are shown.
+const SHOWN: usize = 1000;
+/// Largest number of characters of a line that is shown whole.
+const LONGEST: usize = 160;
+/// Number of characters shown before the place in a longer line.
+const BEFORE: usize = 40;
+
+/// The part of a line about a column, and the column of the same character in it.
+fn excerpt(line: &str, column: usize) -> (String, usize) {
+    if line.chars().nth(LONGEST).is_none() {
+        return (line.to_owned(), column);
+    }
+    let first = column.saturating_sub(BEFORE);
+    let mut rest = line.chars().skip(first);
+    let shown: String = rest.by_ref().take(LONGEST).collect();
+    let [before, after] = [first > 0, rest.next().is_some()].map(|cut| if cut { "…" } else { "" });
+    (format!("{before}{shown}{after}"), column - first + before.chars().count())
 }
 
 /// Formatting into a `String` cannot fail.
@@ -174,13 +194,8 @@ impl Problems {
 
     /// Removes duplicates.
     pub fn dedup(&mut self) {
-        let mut kept: Vec<Problem> = Vec::with_capacity(self.list.len());
-        for problem in self.list.drain(..) {
-            if !kept.contains(&problem) {
-                kept.push(problem);
-            }
-        }
-        self.list = kept;
+        let mut seen = HashSet::new();
+        self.list.retain(|problem| seen.insert(problem.clone()));
     }
 
     /// Returns true if there are no problems so far.
@@ -195,12 +210,8 @@ impl Problems {
 
     /// The problems in the order of the texts, without duplicates; those without a place come last.
     pub fn sorted(&self) -> Vec<&Problem> {
-        let mut sorted: Vec<&Problem> = Vec::with_capacity(self.list.len());
-        for problem in &self.list {
-            if !sorted.contains(&problem) {
-                sorted.push(problem);
-            }
-        }
+        let mut seen = HashSet::new();
+        let mut sorted: Vec<&Problem> = self.list.iter().filter(|p| seen.insert(*p)).collect();
         sorted.sort_by_key(|problem| {
             problem
                 .place
@@ -210,10 +221,14 @@ impl Problems {
         sorted
     }
 
-    /// All problems as plain text, separated by empty lines.
+    /// The first thousand problems as plain text, separated by empty lines, and the number of the others.
     pub fn render(&self, sources: &Sources) -> String {
-        let texts: Vec<String> =
-            self.sorted().into_iter().map(|problem| problem.render(sources)).collect();
+        let sorted = self.sorted();
+        let shown = sorted.iter().take(SHOWN).map(|problem| problem.render(sources));
+        let mut texts: Vec<String> = shown.collect();
+        if sorted.len() > SHOWN {
+            texts.push(format!("{} further problems are not shown\n", sorted.len() - SHOWN));
+        }
         texts.join("\n")
     }
 }

@@ -165,6 +165,34 @@ s.toml:14:5: wrong value for `scale.y`
     assert_eq!(shown, expected, "{shown}");
 }
 
+/// A line of any length is shown about the place of the problem.
+#[test]
+fn of_a_long_line_a_part_is_shown() {
+    let names = "1, ".repeat(30_000);
+    let text = format!("prior = {{ uniform = [0, 1] }}\nnames = [{names}]\nwalkers = 1");
+    let shown = decoded::<Options>(&text).unwrap_err();
+    let first: Vec<&str> = shown.lines().take(4).collect();
+    assert_eq!(first[0], "s.toml:2:10: wrong value for `names.0`");
+    assert!(first[2].starts_with("2 | names = [1, 1,") && first[2].ends_with('…'), "{}", first[2]);
+    let last = format!("steps = {}\"many\"", " ".repeat(70_000));
+    let shown = decoded::<Options>(&last).unwrap_err();
+    let lines: Vec<&str> = shown.lines().collect();
+    let at = lines.iter().position(|line| line.ends_with("\"many\"")).unwrap();
+    assert!(lines[at].starts_with("1 | … "), "{}", lines[at]);
+    let [text, carets] = [lines[at], lines[at + 1]].map(|line| line.chars().collect::<Vec<_>>());
+    let first = carets.iter().position(|c| *c == '^').unwrap();
+    assert_eq!(text[first..].iter().collect::<String>(), "\"many\"");
+}
+
+/// Thousands of unknown keys are read in a moment, and not all shown.
+#[test]
+fn of_thousands_of_problems_some_are_shown() {
+    let keys: String = (0..20_000).map(|i| format!("key{i} = 1\n")).collect();
+    let shown = decoded::<Options>(&keys).unwrap_err();
+    assert_eq!(shown.matches("unknown key").count(), MOST);
+    assert!(shown.contains("further problems here are not shown, after 500"));
+}
+
 #[test]
 fn all_missing_keys_are_named() {
     assert_eq!(heads::<Options>("steps = 3"), ["missing key `walkers`", "missing key `prior`"]);
