@@ -115,7 +115,7 @@ fn noted(
 /// Returns the number of a submission whose command failed, if the scheduler has accepted it nevertheless. If the
 /// answer may have been lost on its way, the scheduler is asked again until the patience is used up.
 fn heard(scheduler: &dyn Scheduler, name: &str, failure: &Stop) -> Result<Option<String>, Stop> {
-    let patience = Duration::from_secs_f64(scheduler.rules().patience);
+    let patience = scheduler.rules().patience;
     let begun = Instant::now();
     loop {
         let found = scheduler.find(name)?;

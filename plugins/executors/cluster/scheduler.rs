@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::Duration;
 
 use lacuna::run::Stop;
 
@@ -49,10 +50,10 @@ pub struct Rules<'a> {
     pub retry: &'a Retry,
     /// Increase of the limits at resubmission.
     pub grow: &'a Growth,
-    /// Longest interval between two queries to the scheduler, in seconds.
-    pub poll: f64,
-    /// Time by which files and accounting may lag behind the end of a job, in seconds.
-    pub patience: f64,
+    /// Longest interval between two queries to the scheduler.
+    pub poll: Duration,
+    /// Time by which files and accounting may lag behind the end of a job.
+    pub patience: Duration,
 }
 
 /// A submission about to be made.

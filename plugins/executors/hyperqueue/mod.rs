@@ -180,8 +180,8 @@ impl Scheduler for HyperQueue {
             pack: self.pack.get(),
             retry: &self.retry,
             grow: &self.grow,
-            poll: self.poll.get(),
-            patience: self.patience.get(),
+            poll: self.poll.seconds(),
+            patience: self.patience.seconds(),
         }
     }
 

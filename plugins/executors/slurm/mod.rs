@@ -187,8 +187,8 @@ impl Scheduler for Slurm {
             pack: self.pack.get(),
             retry: &self.retry,
             grow: &self.grow,
-            poll: self.poll.get(),
-            patience: self.patience.get(),
+            poll: self.poll.seconds(),
+            patience: self.patience.seconds(),
         }
     }
 

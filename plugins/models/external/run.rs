@@ -3,10 +3,10 @@
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
-use std::time::Duration;
 
 use lacuna::plugin::model::{Call, EvalError};
 use lacuna::run::files::in_words;
+use lacuna::text::values::Positive;
 use serde_json::{Map, Value, json};
 
 use super::folder::{cannot, copy, link};
@@ -119,7 +119,7 @@ impl External {
             let size = |file| fs::metadata(folder.join(file)).map_or(0, |found| found.len());
             size(STDOUT) + size(STDERR) <= most
         };
-        let limit = self.timeout.map(|limit| Duration::from_secs_f64(limit.get()));
+        let limit = self.timeout.map(Positive::seconds);
         let ended =
             Process::start(&mut command).and_then(|mut process| process.wait_while(limit, little));
         match ended.map_err(|error| cannot("run", &program, &error))? {

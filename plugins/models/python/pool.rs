@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use lacuna::plugin::model::{Call, EvalError};
+use lacuna::text::values::Positive;
 use serde_json::json;
 
 use super::Python;
@@ -29,7 +30,7 @@ impl Pool {
         calls: &[Call<'_>],
     ) -> Result<Vec<f64>, EvalError> {
         let Some(call) = calls.first() else { return Ok(Vec::new()) };
-        let limit = model.timeout.map(|limit| Duration::from_secs_f64(limit.get()));
+        let limit = model.timeout.map(Positive::seconds);
         let mut worker = match self.waiting() {
             Some(worker) => worker,
             None => start(model, call.study, limit.map(|limit| limit.max(LOADING)))?,
@@ -106,7 +107,7 @@ fn told(model: &Python, function: &str, why: Silent) -> String {
     match why {
         Silent::Failed(text) => format!("`{function}` in {}: {text}", shown(&model.file)),
         Silent::Late => {
-            let limit = model.timeout.map_or(0.0, lacuna::text::values::Positive::get);
+            let limit = model.timeout.map_or(0.0, Positive::get);
             format!("`{function}` in {} was stopped after {limit} s", shown(&model.file))
         }
         Silent::Ended(text) => {

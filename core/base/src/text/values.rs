@@ -2,12 +2,17 @@
 
 use std::borrow::Cow;
 use std::fmt::{self, Display};
+use std::time::Duration;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserializer};
 use serde::{Deserialize, Serialize};
 
 use super::emit::float;
+
+mod name;
+
+pub use name::Name;
 
 /// Error: a value of the right type that is not allowed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -92,6 +97,16 @@ number! {
     /// A finite number above 0.
     Positive, "a number above 0", |x| x.is_finite() && x > 0.0,
     { "type": "number", "exclusiveMinimum": 0 }
+}
+
+/// A hundred years, in seconds.
+const CENTURY: f64 = 3.2e9;
+
+impl Positive {
+    /// This number of seconds, at most a hundred years: a clock cannot add all that a number can state.
+    pub fn seconds(self) -> Duration {
+        Duration::from_secs_f64(self.0.min(CENTURY))
+    }
 }
 
 number! {
@@ -203,81 +218,6 @@ impl JsonSchema for Count {
     }
 }
 
-/// A valid name of a column or key: a letter or `_`, then letters, digits and `_`.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(transparent)]
-pub struct Name(String);
-
-impl Name {
-    /// Checks that a text is a valid name.
-    pub fn new(text: impl Into<String>) -> Result<Self, Unfit> {
-        let text = text.into();
-        let start = text.chars().next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
-        if start && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-            return Ok(Self(text));
-        }
-        let expected = "a name of letters, digits and `_` that does not begin with a digit";
-        Err(Unfit::new(expected, super::node::quoted(&text)))
-    }
-
-    /// The name as text.
-    pub fn as_str(&self) -> &str {
-        &self.0
-    }
-}
-
-impl AsRef<str> for Name {
-    fn as_ref(&self) -> &str {
-        &self.0
-    }
-}
-
-impl std::borrow::Borrow<str> for Name {
-    fn borrow(&self) -> &str {
-        &self.0
-    }
-}
-
-impl TryFrom<String> for Name {
-    type Error = Unfit;
-
-    fn try_from(text: String) -> Result<Self, Unfit> {
-        Self::new(text)
-    }
-}
-
-impl From<Name> for String {
-    fn from(name: Name) -> String {
-        name.0
-    }
-}
-
-impl Display for Name {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-impl<'de> Deserialize<'de> for Name {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Self::new(String::deserialize(deserializer)?).map_err(de::Error::custom)
-    }
-}
-
-impl JsonSchema for Name {
-    fn schema_name() -> Cow<'static, str> {
-        "Name".into()
-    }
-
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": "string", "pattern": "^[A-Za-z_][A-Za-z0-9_]*$" })
-    }
-}
-
 /// Lower and upper bound, written `[low, high]`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(into = "[f64; 2]")]
@@ -368,16 +308,11 @@ mod tests {
         );
         assert!(Fraction::new(1.0).is_ok() && Fraction::new(0.0).is_ok());
         assert!(OpenFraction::new(1.0).is_err() && OpenFraction::new(0.0).is_err());
+        assert_eq!(Positive(0.25).seconds(), Duration::from_millis(250));
+        assert_eq!(Positive(2e19).seconds(), Duration::from_secs_f64(CENTURY));
         assert!(Positive::new(0.0).is_err() && Positive::new(f64::INFINITY).is_err());
         assert!(NonNegative::new(0.0).is_ok() && NonNegative::new(f64::NAN).is_err());
         assert!(Count::new(0).is_err());
         assert!(Interval::new(1.0, 1.0).is_err());
-        assert!(Name::new("x_1").is_ok());
-        assert_eq!(
-            Name::new("1 x").map_err(said),
-            Err("expected a name of letters, digits and `_` that does not begin with a digit, \
-                 found \"1 x\""
-                .to_owned())
-        );
     }
 }

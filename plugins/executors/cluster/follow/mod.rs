@@ -34,7 +34,7 @@ pub fn follow(
         if campaign.handed.iter().all(|handed| *handed) {
             return Ok(());
         }
-        let longest = Duration::from_secs_f64(scheduler.rules().poll);
+        let longest = scheduler.rules().poll;
         std::thread::sleep(pause.min(longest));
         pause = pause.mul_f64(1.5).min(longest);
         campaign.collect(finished)?;
@@ -90,7 +90,7 @@ impl<'a> Campaign<'a> {
     }
 
     fn patience(&self) -> Duration {
-        Duration::from_secs_f64(self.scheduler.rules().patience)
+        self.scheduler.rules().patience
     }
 
     /// Reports the runs that have left a marker.

@@ -55,7 +55,8 @@ impl Scheduler for Stub {
     }
 
     fn rules(&self) -> Rules<'_> {
-        Rules { pack: 1, retry: &self.retry, grow: &self.grow, poll: 0.01, patience: 0.05 }
+        let [poll, patience] = [10, 50].map(Duration::from_millis);
+        Rules { pack: 1, retry: &self.retry, grow: &self.grow, poll, patience }
     }
 
     fn worker(&self) -> Worker<'_> {
