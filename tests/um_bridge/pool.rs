@@ -44,7 +44,9 @@ fn the_study_on_three_servers_goes_as_its_readme_says() {
     agrees_with_least_squares(&quick::summary(&walk.path("runs/pool")));
     // Each server is asked for its information.
     walk.end(1);
-    let said = walk.give(&format!("lacuna check {FOLDER}/study.toml"), 2);
+    let study = format!("{FOLDER}/study.toml");
+    walk.give(&format!("lacuna check {study}"), 0);
+    let said = walk.give(&format!("lacuna run {study} --out runs/none"), 2);
     assert!(said.contains(&format!("no server at http://localhost:{}", ports[1])), "{said}");
     assert!(said.contains("1 problem in"), "{said}");
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use lacuna::text::values::Count;
@@ -19,6 +20,8 @@ pub(super) struct Connection {
     support: OnceLock<Support>,
     input_sizes: OnceLock<Vec<usize>>,
     output_sizes: OnceLock<Vec<usize>>,
+    /// True if the servers are left alone: what can be done without their answers is done so.
+    left_alone: AtomicBool,
 }
 
 impl fmt::Debug for Connection {
@@ -44,12 +47,17 @@ impl UmBridge {
         question: impl Fn(&Client) -> Result<T, Error>,
     ) -> Result<T, Error> {
         let pool = self.connection.pool.get_or_init(|| {
-            let timeout = Duration::try_from_secs_f64(self.timeout.get()).unwrap_or(Duration::MAX);
+            let timeout = self.timeout.seconds();
             let alone = if self.urls.is_empty() { usize::MAX } else { 1 };
             let most = self.parallel.map_or(alone, Count::get);
             Pool::new(self.addresses(), timeout, self.retries, most)
         });
         pool.ask(question)
+    }
+
+    /// Leaves the servers alone from now on, as `lacuna check` does.
+    pub(super) fn leave_servers_alone(&self) {
+        self.connection.left_alone.store(true, Ordering::Relaxed);
     }
 
     /// The addresses of the servers.
@@ -77,8 +85,11 @@ impl UmBridge {
     }
 
     /// Operations that the model supports, from the first server that answers within a minute, without repeated
-    /// requests; `None` if none does.
+    /// requests; `None` if none does, or if they are left alone.
     pub(super) fn support_now(&self) -> Option<Support> {
+        if self.connection.left_alone.load(Ordering::Relaxed) {
+            return None;
+        }
         let ask = || {
             let about = self.about(self.config.clone());
             let of = |url: &String| Client::new(url, Duration::from_secs(60), 0).support(&about);

@@ -1,4 +1,4 @@
-//! Checks of the server for `lacuna check`.
+//! Checks of the server at the beginning of `lacuna run`.
 
 use std::time::Duration;
 

@@ -141,7 +141,11 @@ impl Component for UmBridge {
     }
 
     fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        environment::check(self, context, complaints);
+        if context.starts_programs {
+            environment::check(self, context, complaints);
+        } else {
+            self.leave_servers_alone();
+        }
     }
 }
 

@@ -284,7 +284,6 @@ fn companion_of(study: &Study, node: &Node, problems: &mut Problems) -> Option<C
 fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems) {
     if purpose != Use::Look {
         sizes::environment(study, root, problems);
-        context::gradients::of_model(study, &mut Complaints::new(root, problems));
     }
     let measured: Vec<Scenario> =
         study.scenarios.iter().filter(|scenario| !scenario.unmeasured).cloned().collect();
@@ -298,4 +297,8 @@ fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems
             component.environment(&Context { starts_programs, scenarios, ..*context }, complaints);
         }
     });
+    if purpose != Use::Look {
+        // A model on a server is asked, unless its environment said that it must not.
+        context::gradients::of_model(study, &mut Complaints::new(root, problems));
+    }
 }
