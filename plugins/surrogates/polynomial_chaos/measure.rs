@@ -31,6 +31,9 @@ const NODES: usize = 32;
 /// Log ratio at which a piece is cut off: the integrand of the highest moment is there `exp(-NEGLIGIBLE)` of its
 /// maximum.
 const NEGLIGIBLE: f64 = 80.0;
+/// Largest number of steps to an end of a piece. A density that has not decayed there is that of a single number to double
+/// precision, or zero everywhere.
+const STEPS: usize = 100_000;
 /// Distance from the first infinite moment below which moments are not computed, because their tails are too long.
 const NEAR_INFINITE: f64 = 0.1;
 
@@ -160,7 +163,7 @@ impl Piece {
         law.log_density(self.change.at(s)) + self.change.ln_slope(s)
     }
 
-    /// Returns the ends of the piece for moments up to `2 degree`.
+    /// Returns the ends of the piece for moments up to `2 degree`; NaN where the density does not decay.
     fn reach(&self, law: &Distribution, degree: usize, centre: f64, scale: f64) -> (f64, f64) {
         let size = |s: f64| {
             let z = ((self.change.at(s) - centre) / scale).abs().max(1.0);
@@ -171,7 +174,7 @@ impl Piece {
                 return bound;
             }
             let (mut s, mut largest) = (self.start, f64::NEG_INFINITY);
-            loop {
+            for _ in 0..STEPS {
                 let here = size(s);
                 largest = largest.max(here);
                 if here < largest - NEGLIGIBLE || (bound - s) * step <= 0.0 {
@@ -179,7 +182,30 @@ impl Piece {
                 }
                 s += step;
             }
+            f64::NAN
         };
         (end(self.low, -self.width), end(self.high, self.width))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_density_without_an_end_has_no_recurrence() {
+        for law in [
+            Distribution::TruncatedNormal([0.5, 1e-30, -1.5, 1.5]),
+            Distribution::Quantiles(vec![-1e300, f64::INFINITY, 2.0, 0.1, 0.1 + 1e-16, 0.3]),
+        ] {
+            assert_eq!(law.check(), Ok(()), "{law:?}");
+            let found = recurrence(&law, 3, 0.5, 1.0);
+            assert!(found.sizes.iter().all(|x| !x.is_finite()), "{law:?}: {found:?}");
+        }
+        // A standard deviation far above the interval leaves a uniform distribution.
+        let found = recurrence(&Distribution::TruncatedNormal([0.0, 1e5, -1.0, 1.0]), 3, 0.0, 1.0);
+        let uniform = Recurrence::legendre(3);
+        let mut pairs = found.sizes.iter().zip(&uniform.sizes);
+        assert!(pairs.all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Densities and their derivatives.
 
 use super::Distribution;
-use super::probability::ln_ratio;
+use super::probability::{LARGE_FREEDOM, ln_ratio};
 use super::quantiles::Quantiles;
 use crate::math::special::{
     HALF_LN_TWO_PI, ln_beta_density, ln_gamma_density, ln_gamma_half_step, ln_normal_between,
@@ -12,6 +12,10 @@ fn ln_standard_normal(z: f64) -> f64 {
 }
 
 fn ln_student(dof: f64, z: f64) -> f64 {
+    if dof > LARGE_FREEDOM {
+        // The gamma functions of the constant leave `1 / (4 dof)`.
+        return -HALF_LN_TWO_PI - 0.25 / dof - 0.5 * (dof + 1.0) * (z * z / dof).ln_1p();
+    }
     ln_gamma_half_step(0.5 * dof)
         - 0.5 * (dof * std::f64::consts::PI).ln()
         - 0.5 * (dof + 1.0) * (z * z / dof).ln_1p()

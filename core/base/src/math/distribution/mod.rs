@@ -17,6 +17,9 @@ use quantiles::Quantiles;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+/// Largest shape of a beta distribution: its probabilities need more terms the larger the shape.
+const LARGEST_SHAPE: f64 = 1e9;
+
 /// A distribution of one number, in the unit of that number.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -130,6 +133,9 @@ impl Distribution {
                 complain("a shape and a scale above zero")
             }
             Self::Beta([a, b, _, _]) if a <= 0.0 || b <= 0.0 => complain("a and b above zero"),
+            Self::Beta([a, b, _, _]) if a.max(b) > LARGEST_SHAPE => {
+                complain("a and b of at most 1e9")
+            }
             Self::Beta([_, _, lo, hi]) if lo >= hi => complain("the lower bound below the upper"),
             Self::Exponential(mean) if mean <= 0.0 => complain("a mean above zero"),
             Self::StudentT([dof, _, scale]) | Self::HalfStudentT([dof, scale])

@@ -37,7 +37,7 @@ impl Distribution {
             }
             Self::Exponential(mean) => -(-x / mean).exp_m1(),
             Self::StudentT([dof, location, scale]) => student_cdf(dof, (x - location) / scale),
-            Self::HalfStudentT([dof, scale]) => student_tails(dof, x / scale).1.exp(),
+            Self::HalfStudentT([dof, scale]) => student_size_cdf(dof, x / scale),
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
                 // Near the lower bound the distance from it is known to more digits than `x` itself.
                 let (a, z, width) = ((lo - mean) / sd, (x - mean) / sd, (x - lo) / sd);
@@ -134,7 +134,43 @@ fn student_tails(dof: f64, t: f64) -> (f64, f64) {
     beta_tails(0.5 * dof, 0.5, x, y)
 }
 
+/// Degrees of freedom above which Wallace's normal score of Student's t (Annals of Mathematical Statistics 30 (1959)
+/// 1121) is exact to double precision: its error is of the order `t^3 / (50 dof^2)`. The incomplete beta function needs ever
+/// more terms there.
+pub(super) const LARGE_FREEDOM: f64 = 1e10;
+
+/// The factor of Wallace's score, `(8 dof + 1) / (8 dof + 3)`.
+fn wallace(dof: f64) -> f64 {
+    1.0 - 2.0 / (8.0 * dof + 3.0)
+}
+
+/// The normal score of Student's t with many degrees of freedom.
+fn score_of_student(dof: f64, t: f64) -> f64 {
+    let r = (t / dof.sqrt()).powi(2);
+    let ratio = if r > 0.0 && r.is_finite() { r.ln_1p() / r } else { 1.0 };
+    t * ratio.sqrt() * wallace(dof)
+}
+
+/// Student's t with many degrees of freedom, of this normal score.
+fn student_of_score(dof: f64, z: f64) -> f64 {
+    let u = z / wallace(dof);
+    let r = (u / dof.sqrt()).powi(2);
+    let ratio = if r > 0.0 && r.is_finite() { r.exp_m1() / r } else { 1.0 };
+    u * ratio.sqrt()
+}
+
+/// The probability of a size of Student's t below that of `t`.
+fn student_size_cdf(dof: f64, t: f64) -> f64 {
+    if dof > LARGE_FREEDOM {
+        return libm::erf(score_of_student(dof, t) * std::f64::consts::FRAC_1_SQRT_2);
+    }
+    student_tails(dof, t).1.exp()
+}
+
 fn student_cdf(dof: f64, t: f64) -> f64 {
+    if dof > LARGE_FREEDOM {
+        return normal_cdf(score_of_student(dof, t));
+    }
     let tail = 0.5 * student_tails(dof, t).0.exp();
     if t < 0.0 { tail } else { 1.0 - tail }
 }
@@ -147,6 +183,14 @@ fn student_quantile(dof: f64, p: f64) -> f64 {
 
 /// The size of Student's t with these probabilities of larger and of smaller ones.
 fn student_quantile_of_size(dof: f64, larger: f64, smaller: f64) -> f64 {
+    if dof > LARGE_FREEDOM {
+        let z = if larger <= smaller {
+            -normal_quantile(0.5 * larger)
+        } else {
+            std::f64::consts::SQRT_2 * inverse_erf(smaller)
+        };
+        return student_of_score(dof, z);
+    }
     let (x, y) = inverse_beta(0.5 * dof, 0.5, larger, smaller);
     dof.sqrt() * (y / x).sqrt()
 }
@@ -176,4 +220,35 @@ fn offset_from_bound(a: f64, b: f64, start: f64, p: f64) -> f64 {
         offset *= ((target - value) / slope).exp();
     }
     if offset.is_finite() { offset } else { start }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_degrees_of_freedom_give_the_normal_law() {
+        for dof in [2e10, 1e17, 1e100, 1.7e308] {
+            let student = Distribution::StudentT([dof, 3.0, 2.0]);
+            let half = Distribution::HalfStudentT([dof, 2.0]);
+            for p in [1e-12, 0.001, 0.3, 0.5, 0.8, 0.999] {
+                let (x, size) = (student.quantile(p), half.quantile(p));
+                let normal = Distribution::Normal([3.0, 2.0]);
+                // The first term of the difference, `(z^3 + z) / (4 dof)`, is below 5e-9 here, in units of the scale.
+                assert!((x - normal.quantile(p)).abs() < 2e-8, "{dof}, {p}: {x}");
+                assert!((student.cdf(x) / p - 1.0).abs() < 1e-12, "{dof}, {p}: {x}");
+                assert!((half.cdf(size) / p - 1.0).abs() < 1e-12, "{dof}, {p}: {size}");
+                let density = student.log_density(x);
+                assert!((density - normal.log_density(x)).abs() < 1e-6, "{dof}, {p}: {density}");
+            }
+        }
+        // Both forms give `t = z + (z^3 + z) / (4 dof) + (5 z^5 + 16 z^3 + 3 z) / (96 dof^2)` (Abramowitz and Stegun 26.7.5); the
+        // density of the beta distribution is accurate to about `dof` times the rounding error.
+        let z = normal_quantile(0.99);
+        let expected = z + (z.powi(3) + z) / (4.0 * 1e9);
+        assert!((student_of_score(1e9, z) / expected - 1.0).abs() < 1e-14);
+        let second = 5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z;
+        let expected = z + (z.powi(3) + z) / (4.0 * 1e4) + second / (96.0 * 1e8);
+        assert!((student_quantile(1e4, 0.99) / expected - 1.0).abs() < 1e-11);
+    }
 }

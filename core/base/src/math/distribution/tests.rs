@@ -335,6 +335,17 @@ fn complaints_say_what_was_expected_and_what_was_found() {
             "truncated_normal = [0, 1, 2000, inf]",
             "expected bounds at most 1000 standard deviations from the mean, found [0, 1, 2000, inf]",
         ),
+        (
+            "truncated_normal = [0.5, 0.25, nan, 1.5]",
+            "expected finite numbers, found [0.5, 0.25, NaN, 1.5]",
+        ),
+        (
+            "quantiles = [nan, inf, 2, 0.1, 0.2, 0.3]",
+            "expected increasing quantiles inside the bounds, found [NaN, inf, 2, 0.1, 0.2, 0.3]",
+        ),
+        ("quantiles = [0, nan, 2, 0.1, 0.2, 0.3]", "expected increasing quantiles inside"),
+        ("beta = [1e300, 1e-300]", "expected a and b of at most 1e9, found [1e300, 1e-300, 0, 1]"),
+        ("beta = [2, 1.5e9]", "expected a and b of at most 1e9, found [2, 1.5e9, 0, 1]"),
         ("unifrom = [0, 1]", "found `unifrom` (did you mean `uniform`?)"),
         (
             "normal = [0, 1]\ngamma = [1, 1]",

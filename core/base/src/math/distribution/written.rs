@@ -79,10 +79,10 @@ fn unknown(name: &str) -> String {
     format!("expected a distribution ({}), found `{name}`{hint}", names.join(", "))
 }
 
-/// One number, or a list of numbers. JSON has no infinity: it writes `null`, read here as NaN.
+/// One number, or a list of numbers. JSON has no infinity: it writes `null`, which is `None`.
 enum Numbers {
-    One(f64),
-    List(Vec<f64>),
+    One(Option<f64>),
+    List(Vec<Option<f64>>),
 }
 
 impl<'de> Deserialize<'de> for Numbers {
@@ -101,19 +101,19 @@ impl<'de> Visitor<'de> for Value {
     }
 
     fn visit_f64<E>(self, x: f64) -> Result<Numbers, E> {
-        Ok(Numbers::One(x))
+        Ok(Numbers::One(Some(x)))
     }
 
     fn visit_i64<E>(self, x: i64) -> Result<Numbers, E> {
-        Ok(Numbers::One(x as f64))
+        Ok(Numbers::One(Some(x as f64)))
     }
 
     fn visit_u64<E>(self, x: u64) -> Result<Numbers, E> {
-        Ok(Numbers::One(x as f64))
+        Ok(Numbers::One(Some(x as f64)))
     }
 
     fn visit_unit<E>(self) -> Result<Numbers, E> {
-        Ok(Numbers::One(f64::NAN))
+        Ok(Numbers::One(None))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Numbers, A::Error> {
@@ -130,14 +130,30 @@ impl<'de> Visitor<'de> for Value {
     }
 }
 
+/// The numbers of a list: `null` leaves a bound open, and is no number elsewhere.
+fn bounded(name: &str, list: &[Option<f64>]) -> Vec<f64> {
+    let low = match name {
+        "truncated_normal" => 2,
+        "quantiles" => 0,
+        _ => usize::MAX,
+    };
+    let read = |(i, item): (usize, &Option<f64>)| match (item, i.checked_sub(low)) {
+        (Some(x), _) => *x,
+        (None, Some(0)) => f64::NEG_INFINITY,
+        (None, Some(1)) => f64::INFINITY,
+        (None, _) => f64::NAN,
+    };
+    list.iter().enumerate().map(read).collect()
+}
+
 fn build(name: &str, numbers: &Numbers) -> Result<Distribution, String> {
     let distribution = match numbers {
-        Numbers::One(x) => match name {
-            "half_normal" => Distribution::HalfNormal(*x),
-            "exponential" => Distribution::Exponential(*x),
-            _ => return Err(form(name, &number(*x))),
+        Numbers::One(x) => match (name, x.unwrap_or(f64::NAN)) {
+            ("half_normal", x) => Distribution::HalfNormal(x),
+            ("exponential", x) => Distribution::Exponential(x),
+            (_, x) => return Err(form(name, &number(x))),
         },
-        Numbers::List(list) => match (name, list.as_slice()) {
+        Numbers::List(list) => match (name, bounded(name, list).as_slice()) {
             ("uniform", &[lo, hi]) => Distribution::Uniform([lo, hi]),
             ("normal", &[mean, sd]) => Distribution::Normal([mean, sd]),
             ("log_normal", &[mu, sigma]) => Distribution::LogNormal([mu, sigma]),
@@ -151,17 +167,11 @@ fn build(name: &str, numbers: &Numbers) -> Result<Distribution, String> {
             }
             ("half_student_t", &[dof, scale]) => Distribution::HalfStudentT([dof, scale]),
             ("truncated_normal", &[mean, sd, lo, hi]) => {
-                let lo = if lo.is_nan() { f64::NEG_INFINITY } else { lo };
-                let hi = if hi.is_nan() { f64::INFINITY } else { hi };
                 Distribution::TruncatedNormal([mean, sd, lo, hi])
             }
-            ("quantiles", &[lo, hi, ref rest @ ..]) => {
-                let lo = if lo.is_nan() { f64::NEG_INFINITY } else { lo };
-                let hi = if hi.is_nan() { f64::INFINITY } else { hi };
-                Distribution::Quantiles([&[lo, hi], rest].concat())
-            }
+            ("quantiles", all @ &[_, _, ..]) => Distribution::Quantiles(all.to_vec()),
             ("triangular", &[lo, mode, hi]) => Distribution::Triangular([lo, mode, hi]),
-            _ => return Err(form(name, &in_brackets(list))),
+            (_, numbers) => return Err(form(name, &in_brackets(numbers))),
         },
     };
     distribution.check()?;

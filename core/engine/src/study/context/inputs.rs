@@ -99,7 +99,8 @@ fn no_input(name: &str, path: &str, signature: &Signature, complaints: &mut Comp
     }
 }
 
-/// Reports a known value that is set twice, whose unit does not convert to the input's, or that lies outside its range.
+/// Reports a known value that is set twice, whose unit does not convert to the input's, or that is not finite or lies outside
+/// its range.
 fn known_fits<'s>(
     value: f64,
     unit: Option<&Unit>,
@@ -122,6 +123,13 @@ fn known_fits<'s>(
                 .say(format!("`{}` has the wrong unit", input.name))
                 .expected(format!("a unit that converts to `{}`", input.unit))
                 .found(unit.map_or(String::new(), |unit| format!("`{unit}`")));
+        }
+        Some(value) if !value.is_finite() => {
+            complaints
+                .at(path)
+                .say(format!("`{}` is not finite", input.name))
+                .expected("a finite number")
+                .found(value);
         }
         Some(value) if !(input.range.0..=input.range.1).contains(&value) => {
             out_of_range(input, value, &input.unit.to_string(), path, complaints);

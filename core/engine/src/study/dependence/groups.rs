@@ -283,6 +283,10 @@ fn shares(
         return None;
     }
     let marginals = Copula::marginals_of_shares(concentrations);
+    if let Some(text) = marginals.iter().find_map(|law| law.check().err()) {
+        complaints.at("dirichlet").say(format!("the beta distribution of a share: {text}"));
+        return None;
+    }
     let mut fits = true;
     for (&j, law) in members.iter().zip(&marginals) {
         let parameter = &parameters[j];
