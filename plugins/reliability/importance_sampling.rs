@@ -3,7 +3,7 @@
 use lacuna::math::random::{Stream, normal, uniform};
 use lacuna::math::special::{ln_sum_exp, normal_cdf};
 use lacuna::plugin::reliability::{DesignPoint, Estimate, LimitState};
-use lacuna::plugin::{Component, Context, Reliability};
+use lacuna::plugin::{Component, Context, Reliability, Size};
 use lacuna::run::{Progress, Stop};
 use lacuna::text::Complaints;
 use lacuna_linalg::Matrix;
@@ -52,6 +52,12 @@ impl Component for ImportanceSampling {
         at_least("samples", self.samples, 100, complaints);
         at_least("batch", self.batch, 10, complaints);
         between("variation", self.variation, (0.0, 1.0), complaints);
+    }
+
+    fn room(&self, unknowns: usize) -> Vec<Size> {
+        // The points one by one and as rows, each with its place and its value.
+        let numbers = 2 * unknowns + 4;
+        vec![Size { key: "batch", what: "the samples", value: self.batch, numbers }]
     }
 }
 
@@ -142,3 +148,15 @@ fn moments(weights: &[f64]) -> (f64, f64) {
 }
 
 lacuna::register!(Reliability, "importance_sampling", ImportanceSampling);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_samples_of_a_batch_need_memory() {
+        let found = ImportanceSampling { batch: 1000, ..ImportanceSampling::default() }.room(3);
+        let what = "the samples";
+        assert_eq!(found, [Size { key: "batch", what, value: 1000, numbers: 10 }]);
+    }
+}

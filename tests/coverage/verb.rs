@@ -163,6 +163,8 @@ fn what_cannot_be_counted_is_refused() {
     let error = stop(&[], &few);
     assert!(error.contains("no `[measurements]`"), "{error}");
     fs::write(&path, &text).unwrap();
+    let error = stop(&[], &asked(10_000_000_000_000, None));
+    assert!(error.starts_with("10000000000000 truths with their responses need"), "{error}");
     // One replicate has no residuals.
     let data = line::replicates([0.4, -0.3], 0.5, 1, &mut noise::Source::new(5));
     fs::write(folder.path().join("line.csv"), line::table(&data)).unwrap();

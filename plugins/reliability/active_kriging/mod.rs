@@ -6,13 +6,14 @@ mod process;
 
 use lacuna::math::random::Stream;
 use lacuna::plugin::reliability::{Estimate, LimitState};
-use lacuna::plugin::{Component, Context, Reliability};
+use lacuna::plugin::{Component, Context, Reliability, Size};
 use lacuna::run::{Progress, Stop};
 use lacuna::text::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::common::{Counted, at_least, between};
+use super::subset_simulation::of_level;
 use crate::surrogates::kriging::Kernel;
 
 /// Active learning with Kriging: a Gaussian process replaces the limit state, and the model is called where the sign of the
@@ -79,6 +80,14 @@ impl Component for ActiveKriging {
         between("precision", self.precision, (0.0, 1.0), complaints);
         at_least("samples", self.samples, 500, complaints);
         at_least("final_samples", self.final_samples, 1000, complaints);
+    }
+
+    fn room(&self, unknowns: usize) -> Vec<Size> {
+        // One repetition has a part of the final samples, and the four results are kept.
+        vec![
+            of_level("samples", self.samples, unknowns),
+            of_level("final_samples", self.final_samples, unknowns),
+        ]
     }
 }
 

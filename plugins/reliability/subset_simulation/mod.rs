@@ -5,7 +5,7 @@ mod levels;
 
 use lacuna::math::random::Stream;
 use lacuna::plugin::reliability::{Estimate, LimitState};
-use lacuna::plugin::{Component, Context, Reliability};
+use lacuna::plugin::{Component, Context, Reliability, Size};
 use lacuna::run::{Progress, Stop};
 use lacuna::text::Complaints;
 use lacuna_linalg::Matrix;
@@ -50,6 +50,16 @@ impl Component for SubsetSimulation {
         between("level_probability", self.level_probability, (0.0, 0.51), complaints);
         at_least("levels", self.levels, 1, complaints);
     }
+
+    fn room(&self, unknowns: usize) -> Vec<Size> {
+        vec![of_level("samples", self.samples, unknowns)]
+    }
+}
+
+/// Memory of a simulation by the samples of a level: their points, values and chains, the values in order, and the points
+/// and values of the model.
+pub fn of_level(key: &'static str, samples: usize, unknowns: usize) -> Size {
+    Size { key, what: "the samples", value: samples, numbers: 2 * unknowns + 4 }
 }
 
 impl Reliability for SubsetSimulation {
@@ -93,3 +103,15 @@ impl Reliability for SubsetSimulation {
 }
 
 lacuna::register!(Reliability, "subset_simulation", SubsetSimulation);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_samples_of_a_level_need_memory() {
+        let found = SubsetSimulation { samples: 1000, ..SubsetSimulation::default() }.room(3);
+        let what = "the samples";
+        assert_eq!(found, [Size { key: "samples", what, value: 1000, numbers: 10 }]);
+    }
+}

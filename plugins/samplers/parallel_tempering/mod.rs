@@ -8,7 +8,7 @@ mod tests;
 
 use lacuna::math::random::Stream;
 use lacuna::plugin::sampler::{Evidence, Plan, Start, State};
-use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
+use lacuna::plugin::{Component, Context, Fact, Sampler, Size, Target};
 use lacuna::run::Stop;
 use lacuna::text::Complaints;
 use lacuna_linalg::Matrix;
@@ -77,6 +77,13 @@ impl Component for ParallelTempering {
                 .expected("at least 2, that of the posterior and the infinite one")
                 .found(self.temperatures);
         }
+    }
+
+    fn room(&self, unknowns: usize) -> Vec<Size> {
+        // A walker has its point and two densities, as numbers and as values of four times the size in the state.
+        let numbers = (5 * (unknowns + 2)).saturating_mul(self.walkers);
+        let what = "the walkers of all temperatures";
+        vec![Size { key: "temperatures", what, value: self.temperatures, numbers }]
     }
 }
 

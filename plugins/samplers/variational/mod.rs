@@ -8,7 +8,7 @@ mod refine;
 use lacuna::math::random::Stream;
 use lacuna::math::transform::Unconstrained;
 use lacuna::plugin::sampler::{Harvest, Plan, State};
-use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
+use lacuna::plugin::{Component, Context, Fact, Sampler, Size, Target};
 use lacuna::run::Stop;
 use lacuna::text::Complaints;
 use lacuna_linalg::Matrix;
@@ -151,6 +151,12 @@ impl Component for Variational {
                     .found(found);
             }
         }
+    }
+
+    fn room(&self, unknowns: usize) -> Vec<Size> {
+        // Two proposals a draw, each with its density, its ratio and its weight, and the draw with its density and places.
+        let numbers = 3 * unknowns + 9;
+        vec![Size { key: "draws", what: "the draws", value: self.draws, numbers }]
     }
 }
 

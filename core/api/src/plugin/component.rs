@@ -30,7 +30,8 @@ pub struct Context<'a> {
     /// True if the likelihood will have errors common to all replicates: of the emulator or of the model's numerics.
     /// Errors of the replicates' mean are known only with the data.
     pub common_errors: bool,
-    /// True if a plugin may start programs that the study names in order to inspect them; `lacuna check` starts none.
+    /// True if a plugin may start programs and contact servers that the study names in order to inspect them; `lacuna check`
+    /// does neither.
     pub starts_programs: bool,
 }
 
@@ -68,6 +69,12 @@ pub trait Component: Send + Sync {
     /// named by the study is started unless the context allows it.
     fn environment(&self, _context: &Context<'_>, _complaints: &mut Complaints<'_>) {}
 
+    /// Sizes among the options with the memory that they need at once in a study with so many unknowns, beside that of the
+    /// results that the engine keeps; empty if no option asks for much.
+    fn room(&self, _unknowns: usize) -> Vec<Size> {
+        Vec::new()
+    }
+
     /// Faults of a plugin that can fail where its interface has no room for errors; a plugin that calls others returns
     /// theirs.
     fn faults(&self) -> Vec<Arc<Fault>> {
@@ -84,6 +91,19 @@ pub trait Component: Send + Sync {
     fn revisions(&self) -> BTreeMap<String, u32> {
         BTreeMap::new()
     }
+}
+
+/// An option that sets the memory of a plugin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Size {
+    /// Key of the option.
+    pub key: &'static str,
+    /// The objects that need the memory, as the subject of a message: `the samples`.
+    pub what: &'static str,
+    /// Value of the option.
+    pub value: usize,
+    /// Numbers of eight bytes that the plugin holds at least for each of them.
+    pub numbers: usize,
 }
 
 /// One fact about a result: a row of a table in the report.

@@ -26,7 +26,7 @@ pub mod surrogate;
 pub mod term;
 
 pub use amend::Amend;
-pub use component::{Component, Context, Fact, Given};
+pub use component::{Component, Context, Fact, Given, Size};
 pub use density::Density;
 pub use design::Design;
 pub use discrepancy::{Discrepancy, Hyperparameter, Likelihood};

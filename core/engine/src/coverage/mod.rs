@@ -11,6 +11,7 @@ use std::path::Path;
 
 use lacuna::diagnose::coverage::{Case, Coordinate, Coverage, Ended, Noise, tally};
 use lacuna::run::{Observer, Progress, Silent, Stop, files};
+use lacuna::text::memory::{NUMBER, amount, of_machine};
 use lacuna_run::progress::Recorded;
 use lacuna_run::work::Then;
 use lacuna_run::{Artifact, RunDirectory, Stage};
@@ -81,6 +82,7 @@ pub fn coverage(
     observer: &dyn Observer,
 ) -> Result<Coverage, Stop> {
     refuse(study)?;
+    fits(study, asked.count)?;
     directory.watch(study.faults());
     directory.uses(study.libraries.all().map(|library| library.sha256.clone()));
     let recorded = Recorded::new(directory.root(), observer);
@@ -164,6 +166,21 @@ fn refuse(study: &Study) -> Result<(), Stop> {
         ))),
         None => Ok(()),
     }
+}
+
+/// Refuses a number of truths that this machine cannot hold with their responses.
+fn fits(study: &Study, count: usize) -> Result<(), Stop> {
+    let Some(memory) = of_machine() else { return Ok(()) };
+    let values = study.parameters.len() + study.layouts.len();
+    let bytes = NUMBER * values as f64 * count as f64;
+    if bytes <= memory {
+        return Ok(());
+    }
+    let (needed, has) = (amount(bytes), amount(memory));
+    let text = format!(
+        "{count} truths with their responses need {needed} of memory; this machine has {has}"
+    );
+    Err(Stop::new(text).help("ask for fewer: `--count`"))
 }
 
 /// Everything on which the cases depend, except for their numbers.

@@ -3,6 +3,7 @@
 
 use std::fmt;
 
+use lacuna::plugin::Size;
 use lacuna::plugin::sampler::Plan;
 use lacuna::text::memory::{MOST, NUMBER, amount, of_machine};
 use lacuna::text::{Complaints, Node, Problems};
@@ -220,8 +221,29 @@ fn needs(study: &Study) -> Vec<Need> {
             // As the sampler writes them, as the stage keeps them, and in `posterior.nc`.
             add(&key, "the draws", size as usize, each, 1.5 * each);
         }
+        let sizes = section.built.plugin.room(study.parameters.len());
+        needs.extend(sizes.into_iter().map(|size| within("sampler", size)));
     }
+    // Probabilities are estimated one after the other.
+    needs.extend(reliability(study).max_by(|a, b| a.bytes.total_cmp(&b.bytes)));
     needs
+}
+
+/// Memory of the methods of `[[reliability]]`, by their options.
+fn reliability(study: &Study) -> impl Iterator<Item = Need> {
+    let unknowns = study.parameters.len();
+    study.reliability.iter().flat_map(move |section| {
+        let path = format!("reliability.{}", section.common.name.as_str());
+        let sizes = section.built.plugin.room(unknowns).into_iter();
+        sizes.map(move |size| within(&path, size))
+    })
+}
+
+/// Memory of a plugin by one of its options, which stand at this path.
+fn within(path: &str, size: Size) -> Need {
+    let Size { key, what, value, numbers } = size;
+    let bytes = NUMBER * value as f64 * numbers as f64;
+    Need { key: format!("{path}.{key}"), what, size: value as f64, bytes, written: 0.0 }
 }
 
 /// The largest whole number among options.
