@@ -10,7 +10,8 @@ use lacuna_engine::compare::{self, Finished};
 use lacuna_engine::pipeline;
 use lacuna_engine::report::findings::Findings;
 use lacuna_engine::report::summary_text;
-use lacuna_engine::stage;
+use lacuna_engine::stage::manifest::RESOLVED;
+use lacuna_engine::stage::{self, manifest};
 use lacuna_engine::study::resolve::{self, Use};
 use lacuna_engine::study::sizes::Memory;
 use lacuna_engine::study::{Checked, Study};
@@ -99,7 +100,7 @@ pub fn folder(study: &Study, out: Option<&Path>) -> PathBuf {
     let names: Vec<String> =
         [study.name.clone(), stem, long.clone()].into_iter().chain(numbered).collect();
     let folders = || names.iter().map(|name| runs.join(name));
-    let of = |folder: &Path| stage::manifest::origin(folder);
+    let of = |folder: &Path| manifest::origin(folder);
     let is_own = |folder: &PathBuf| of(folder).is_some_and(|other| other == file);
     let is_free = |folder: &PathBuf| of(folder).is_none_or(|other| !other.exists());
     folders().find(is_own).or_else(|| folders().find(is_free)).unwrap_or_else(|| runs.join(long))
@@ -212,7 +213,7 @@ fn kept_study(folder: &Path) -> anyhow::Result<Study> {
 
 /// Like [`kept_study`], for the given purpose.
 pub fn kept_study_for(folder: &Path, purpose: Use) -> anyhow::Result<Study> {
-    let resolved = folder.join("resolved.toml");
+    let resolved = folder.join(RESOLVED);
     if !resolved.exists() {
         let text =
             format!("error: {} is no run directory: it has no resolved.toml", folder.display());
@@ -222,11 +223,18 @@ pub fn kept_study_for(folder: &Path, purpose: Use) -> anyhow::Result<Study> {
     let written: PathBuf = folder.join("study.toml");
     study.text = String::from_utf8_lossy(&files::read(&written)?).into_owned();
     let edited = |hash: String| hash != files::hash(study.text.as_bytes());
-    if stage::manifest::study_hash(folder).is_some_and(edited) {
+    if manifest::study_hash(folder).is_some_and(edited) {
         let (file, resolved) = (written.display(), resolved.display());
         tell(&format!(
             "warning: {file} has been changed since the run began. It is a copy and is not read: the run goes on as {resolved} says. \
              To change a study, edit its own file and run that"
+        ));
+    }
+    if manifest::resolved_is_edited(folder) {
+        let (file, folder) = (resolved.display(), folder.display());
+        tell(&format!(
+            "warning: {file} has been changed since Lacuna wrote it. It is read as it is now, and results in {folder} may be those of \
+             the study before the change; `lacuna resume {folder}` makes again what the change concerns"
         ));
     }
     Ok(study)

@@ -4,6 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use lacuna::run::files;
+
 use super::{outcomes, run, study};
 use crate::quick;
 
@@ -112,6 +114,8 @@ fn runs_made_by_hand_are_taken_in() {
         ("run,a,file\nx,low,first.csv\n", "line 2: expected a number for `a`, found `low`"),
         ("run,a,file\nx,0.25,third.csv\n", "third.csv"),
         ("run,a [m],file\nx,0.25,first.csv\n", "`m` does not convert"),
+        ("run,a,file\nrun001,0.25,first.csv\n", "runs.csv: there is a run `run001` already"),
+        ("run,a,file\nx,1e300,first.csv\n", "`a` is 1e300, and its design reaches from 0 to 1"),
     ] {
         fs::write(&table, text).unwrap();
         let (code, said) = quick::said(&mut import(&out));
@@ -122,6 +126,10 @@ fn runs_made_by_hand_are_taken_in() {
     fs::write(&table, "run,a,file\nby-hand-1,0.25,first.csv\nby-hand-2,0.75,second.csv\n").unwrap();
     let said = printed(&mut import(&out));
     assert!(said.starts_with("2 runs imported into"), "{said}");
+    let (code, said) = quick::said(&mut import(&out));
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("there is a run `by-hand-1` already"), "{said}");
+    assert!(!out.join("imports/2").exists());
     let (code, text) = quick::said(quick::command().arg("resume").arg(&out));
     assert_eq!(code, Some(0), "{text}");
     assert_eq!(made(folder.path()).len(), 6, "no run is made again");
@@ -135,4 +143,46 @@ fn runs_made_by_hand_are_taken_in() {
     let (code, text) = quick::said(quick::command().arg("resume").arg(&out));
     assert_eq!(code, Some(1));
     assert!(text.contains("by-hand-2.nc is not as it was imported"), "{text}");
+}
+
+#[test]
+fn edits_in_a_run_directory_are_told_and_the_manifest_names_what_ran() {
+    let (folder, path) = study(COUNTED, "use = \"local\"");
+    fs::write(folder.path().join("mended"), "").unwrap();
+    let out = folder.path().join("run");
+    assert_eq!(quick::said(&mut run(&path, &out, &[])).0, Some(0));
+    let (resolved, record) = (out.join("resolved.toml"), out.join("resolved.sha256"));
+    let written = files::hash_file(&path).unwrap();
+    let manifest_is_true = || {
+        let manifest: serde_json::Value = files::read_json(&out.join("manifest.json")).unwrap();
+        assert_eq!(manifest["study_sha256"], written);
+        assert_eq!(manifest["resolved_sha256"], files::hash_file(&resolved).unwrap());
+    };
+    manifest_is_true();
+    let resume = || quick::said(quick::command().arg("resume").arg(&out));
+    let status = || quick::said(&mut campaign(&["status"], &out));
+    let of_copy = "study.toml has been changed since the run began";
+    let of_resolved = "resolved.toml has been changed since Lacuna wrote it";
+
+    quick::replace(&out.join("study.toml"), "seed = 3", "seed = 4");
+    let (code, text) = resume();
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains(of_copy) && !text.contains(of_resolved), "{text}");
+    manifest_is_true();
+
+    quick::replace(&resolved, "runs = 6", "runs = 5");
+    assert!(status().1.contains(of_resolved), "{}", status().1);
+    // Run directories of earlier versions have no record.
+    let recorded = fs::read(&record).unwrap();
+    fs::remove_file(&record).unwrap();
+    let (code, text) = status();
+    assert!(code == Some(0) && !text.contains(of_resolved), "{text}");
+    fs::write(&record, recorded).unwrap();
+    // An extension does not hide the edit.
+    printed(&mut campaign(&["extend", "--runs", "1"], &out));
+    let (code, text) = resume();
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains(of_resolved), "{text}");
+    manifest_is_true();
+    assert!(!status().1.contains(of_resolved), "{}", status().1);
 }

@@ -9,6 +9,7 @@ use lacuna_run::RunDirectory;
 use toml::{Table, Value};
 
 use crate::stage::design;
+use crate::stage::manifest::{self, RESOLVED};
 use crate::study::{Study, resolve};
 
 /// Result of an extension.
@@ -19,8 +20,6 @@ pub struct Grown {
     /// Line with the same effect for the user's own study, section `[design]`.
     pub line: String,
 }
-
-const RESOLVED: &str = "resolved.toml";
 
 /// Adds runs to the design of a run directory. Existing runs are kept.
 pub fn extend(run: &RunDirectory, count: usize) -> Result<Grown, Stop> {
@@ -76,7 +75,14 @@ fn change(
     if let Some(section) = &study.design {
         design::cube(section, study.trained())?;
     }
-    files::write_atomic(&path, grown.as_bytes())?;
+    // Further runs and imported ones need names of their own.
+    design::run_names(study.trained())?;
+    if manifest::resolved_is_edited(run.root()) {
+        // The record stays that of the text before it was edited, so that the warning about it stays too.
+        files::write_atomic(&path, grown.as_bytes())?;
+    } else {
+        manifest::write_resolved(run.root(), &grown)?;
+    }
     // The run is no longer finished.
     let manifest = run.root().join("manifest.json");
     match fs::remove_file(&manifest) {

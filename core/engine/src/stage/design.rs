@@ -12,6 +12,7 @@ use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
 use serde_json::json;
 
 use super::imports::{self, Imported};
+use super::read::outside::refuse_points;
 use super::stream;
 use crate::study::Study;
 use crate::study::file::DesignKeys;
@@ -70,12 +71,7 @@ pub fn stage(
     let inputs = if inputs.len() == 1 { inputs.remove(0) } else { json!(inputs) };
     observer.begin(Stage::Design.label(), "run", 0);
     let design = run.keep(&Stage::Design.folder(), &inputs, observer, |_| {
-        let cube = cube(section, study)?;
-        let mut points = physical(&cube, &study.parameters);
-        for imported in &imported {
-            imported.points.iter_rows().for_each(|point| points.push_row(point));
-        }
-        Ok(Design { points })
+        Ok(Design { points: points(section, study, &imported)? })
     })?;
     let names = names(&section.common, &imported)?;
     let brought = names.len() - section.common.total();
@@ -85,6 +81,38 @@ pub fn stage(
         &format!("{} runs by {}{note}", section.common.total(), section.built.name),
     );
     Ok(Some(Placed { design, names, imported }))
+}
+
+/// Points of all runs in physical units, those of the imported ones last.
+fn points(
+    section: &Section<dyn Plugin, DesignKeys>,
+    study: &Study,
+    imported: &[Imported],
+) -> Result<Matrix, Stop> {
+    let mut points = physical(&cube(section, study)?, &study.parameters);
+    for imported in imported {
+        imported.points.iter_rows().for_each(|point| points.push_row(point));
+    }
+    Ok(points)
+}
+
+/// Refuses runs that cannot be imported beside those that the design has: with the name of another run, or outside the
+/// declared design.
+pub fn accept(study: &Study, runs: &[String], further: &Matrix) -> Result<(), Stop> {
+    let Some(section) = &study.design else { return Ok(()) };
+    let imported = imports::read(study)?;
+    let mut names = names(&section.common, &imported)?;
+    if let Some(twice) = runs.iter().find(|run| names.contains(run)) {
+        return Err(Stop::new(format!("there is a run `{twice}` already"))
+            .help("give it another name in the column `run` of the table"));
+    }
+    if study.surrogate.is_none() {
+        return Ok(());
+    }
+    let mut points = points(section, study, &imported)?;
+    further.iter_rows().for_each(|point| points.push_row(point));
+    names.extend(runs.iter().cloned());
+    refuse_points(study, &points, &names)
 }
 
 /// Points of the unit cube: the initial runs, followed by the additions in their order.

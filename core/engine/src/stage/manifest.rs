@@ -27,7 +27,30 @@ pub fn study_hash(root: &Path) -> Option<String> {
     Some(std::fs::read_to_string(root.join(HASH)).ok()?.trim_end().to_owned())
 }
 
-/// Writes `study.toml` (byte for byte), `resolved.toml` (which runs as it is) and the path of the study.
+/// The study of a run directory with every default filled in.
+pub const RESOLVED: &str = "resolved.toml";
+
+/// File that holds the SHA-256 of `resolved.toml` as it was last written.
+const RESOLVED_HASH: &str = "resolved.sha256";
+
+/// True if `resolved.toml` is not as it was last written; false if its hash was not recorded.
+pub fn resolved_is_edited(root: &Path) -> bool {
+    let recorded = std::fs::read_to_string(root.join(RESOLVED_HASH));
+    let found = std::fs::read(root.join(RESOLVED));
+    match (recorded, found) {
+        (Ok(recorded), Ok(found)) => recorded.trim_end() != files::hash(&found),
+        _ => false,
+    }
+}
+
+/// Writes `resolved.toml` and records its hash.
+pub fn write_resolved(root: &Path, text: &str) -> Result<(), Stop> {
+    files::write_atomic(&root.join(RESOLVED), text.as_bytes())?;
+    let hash = format!("{}\n", files::hash(text.as_bytes()));
+    files::write_atomic(&root.join(RESOLVED_HASH), hash.as_bytes())
+}
+
+/// Writes `study.toml` (byte for byte), `resolved.toml` (which runs as it is), their hashes and the path of the study.
 pub fn begin(study: &Study, run: &mut RunDirectory) -> Result<(), Stop> {
     run.watch(study.faults());
     run.uses(study.libraries.all().map(|library| library.sha256.clone()));
@@ -37,25 +60,32 @@ pub fn begin(study: &Study, run: &mut RunDirectory) -> Result<(), Stop> {
     if !file.starts_with(&root) {
         let text = format!("{}\n", file.display());
         files::write_atomic(&run.root().join(ORIGIN), text.as_bytes())?;
+    }
+    // Its own `resolved.toml` is the recorded study, whatever has become of the copy beside it.
+    if file != root.join(RESOLVED) || study_hash(&root).is_none() {
         let hash = format!("{}\n", files::hash(study.text.as_bytes()));
         files::write_atomic(&run.root().join(HASH), hash.as_bytes())?;
+        files::write_atomic(&run.root().join("study.toml"), study.text.as_bytes())?;
     }
-    files::write_atomic(&run.root().join("study.toml"), study.text.as_bytes())?;
     let resolved = emit::to_toml(&study.resolved)
         .map_err(|error| Stop::new(format!("cannot write resolved.toml: {error}")))?;
     let version = env!("CARGO_PKG_VERSION");
     let head = format!(
         "# Written by lacuna {version}: every default filled in. It runs as it stands.\n\n"
     );
-    files::write_atomic(&run.root().join("resolved.toml"), (head + &resolved).as_bytes())
+    write_resolved(run.root(), &(head + &resolved))
 }
 
 /// Writes `manifest.json`: versions, and for each stage the hash of its inputs, its files and its time.
 pub fn end(study: &Study, run: &RunDirectory) -> Result<(), Stop> {
+    // Of a resumed run the text is that of the copy in the directory, which is not what ran.
+    let written = study_hash(run.root()).unwrap_or_else(|| files::hash(study.text.as_bytes()));
+    let resolved = files::hash_file(&run.root().join(RESOLVED))?;
     let manifest = json!({
         "schema": 1,
         "study": study.name,
-        "study_sha256": files::hash(study.text.as_bytes()),
+        "study_sha256": written,
+        "resolved_sha256": resolved,
         "lacuna": env!("CARGO_PKG_VERSION"),
         "seed": study.about.seed,
         "plugins": study.libraries.all().map(described).collect::<Vec<_>>(),

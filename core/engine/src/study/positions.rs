@@ -1,9 +1,9 @@
 //! Positions of labels along the axes of the response.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use lacuna::data::Unit;
-use lacuna::text::labels::LabelSection;
+use lacuna::text::labels::{LabelSection, place};
 use lacuna::text::response::{Axes, AxisSection, ResponseSection};
 use lacuna::text::{Complaints, Node, Problems};
 use serde::Serialize;
@@ -66,17 +66,20 @@ fn merged(
         all.len() - 1
     });
     let known = &mut all[k];
+    let mut there: HashMap<u64, String> =
+        known.at.iter().map(|(label, x)| (place(*x), label.clone())).collect();
     for (label, x) in placed {
         let Some(x) = section.unit.convert(x, &known.unit) else {
             let reason =
                 format!("expected a unit such as `{}`, found `{}`", known.unit, section.unit);
             return Err(("unit", reason));
         };
-        if let Some((other, _)) = known.at.iter().find(|(other, at)| *other != label && **at == x) {
+        if let Some(other) = there.get(&place(x)).filter(|other| *other != label) {
             let reason =
                 format!("expected different positions, found {x} for both `{other}` and `{label}`");
             return Err(("positions", reason));
         }
+        there.insert(place(x), label.to_owned());
         let before = known.at.insert(label.to_owned(), x);
         if let Some(before) = before.filter(|before| *before != x) {
             let reason = format!("expected one position of `{label}`, found {before} and {x}");

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use lacuna::data::{Condition, Function, Interpolation, Scenario, Unit};
+use lacuna::text::labels;
 use lacuna::text::response::Axes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -86,7 +87,13 @@ impl ScenarioSection {
                 Err(reason) => complain(&format!("functions.{name}"), reason),
             }
         }
-        let whole = functions.len() == self.functions.len();
+        let mut whole = functions.len() == self.functions.len();
+        for (kind, label) in &self.labels {
+            if let Err(reason) = labels::check(label) {
+                complain(&format!("labels.{kind}"), format!("the label `{kind}`: {reason}"));
+                whole = false;
+            }
+        }
         let values = self.values.iter().map(condition).collect();
         whole.then(|| Scenario {
             name: self.name.clone(),

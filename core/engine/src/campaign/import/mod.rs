@@ -12,6 +12,7 @@ use lacuna_linalg::Matrix;
 use lacuna_run::{Artifact as _, RunDirectory, write_response};
 
 use super::grow;
+use crate::stage::design;
 use crate::stage::imports;
 use crate::stage::read::{self, Runs};
 use crate::stage::simulate::{Made, Roll, RunRecord, Simulated};
@@ -31,7 +32,8 @@ pub struct Imports {
 ///
 /// The table is CSV with the columns `run` (a name, optional), `file` (relative to the table), `scenario` in a study
 /// with scenarios, and one for each parameter, in the study's unit or as `density [g/cm3]`. Files have the format that
-/// the study's `[simulations]` reads, or any format that `reader` knows.
+/// the study's `[simulations]` reads, or any format that `reader` knows. Runs that the study would refuse when it goes on,
+/// by name or parameters, are refused before anything is written.
 pub fn import(
     study: &Study,
     run: &RunDirectory,
@@ -44,6 +46,10 @@ pub fn import(
     }
     let study = study.trained();
     let rows = rows(study, table)?;
+    let names: Vec<String> = rows.iter().map(|row| row.run.clone()).collect();
+    let wrong =
+        |stop: Stop| Stop { message: format!("{}: {}", table.display(), stop.message), ..stop };
+    design::accept(study, &names, &points(study, &rows)).map_err(wrong)?;
     let folder = free_folder(run);
     let taken = take(study, &rows, &folder, reader).and_then(|runs| {
         imports::of_folder(study, &folder)?;
@@ -58,6 +64,11 @@ pub fn import(
             Err(stop)
         }
     }
+}
+
+/// Parameters of the runs.
+fn points(study: &Study, rows: &[Row]) -> Matrix {
+    Matrix::from_rows(study.parameters.len(), rows.iter().map(|row| row.point.clone()))
 }
 
 /// The next unused folder.
@@ -107,7 +118,7 @@ fn take(
         }
         scenarios.push(Made { folder: own, runs });
     }
-    let points = Matrix::from_rows(study.parameters.len(), rows.iter().map(|r| r.point.clone()));
+    let points = points(study, rows);
     let parameters = study.parameters.iter().map(|p| p.name.clone()).collect();
     let made = Simulated { scenarios, parameters, points };
     made.save(folder)?;

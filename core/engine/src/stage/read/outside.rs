@@ -2,6 +2,7 @@
 
 use lacuna::data::{Ensemble, Parameter, Scenario};
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 
 use crate::study::Study;
 use crate::study::file::OutsideDesign;
@@ -26,19 +27,23 @@ const TAIL: f64 = 1e-9;
 /// A table is written with a limited number of digits: a value counts as outside if it is beyond the bound by more than
 /// half a unit of the column's last digit, or by 1e-9 of the design's width.
 pub fn runs(parameters: &[Parameter], ensemble: &Ensemble) -> Vec<Outside> {
+    among(parameters, &ensemble.points)
+}
+
+fn among(parameters: &[Parameter], points: &Matrix) -> Vec<Outside> {
     let bounds: Vec<(f64, f64)> = parameters
         .iter()
         .enumerate()
         .map(|(j, parameter)| {
             let (low, high) = limits(parameter);
             // Slightly more than half, because decimal numbers are rounded in memory.
-            let last = 0.500_001 * last_digit(&ensemble.points.column(j));
+            let last = 0.500_001 * last_digit(&points.column(j));
             let width = if (high - low).is_finite() { 1e-9 * (high - low) } else { 0.0 };
             let slack = last.max(width);
             (low - slack, high + slack)
         })
         .collect();
-    let points = ensemble.points.iter_rows().enumerate();
+    let points = points.iter_rows().enumerate();
     let of_run = |(run, point): (usize, &[f64])| {
         let outside = |(parameter, (&value, &(low, high))): (usize, (&f64, &(f64, f64)))| {
             (value < low || value > high).then_some(Outside { run, parameter, value })
@@ -72,19 +77,29 @@ fn last_digit(values: &[f64]) -> f64 {
 
 /// Returns an error for runs outside the declared design, unless the study permits them.
 pub(in crate::stage) fn refuse(study: &Study, ensemble: &Ensemble) -> Result<(), Stop> {
+    refuse_points(study, &ensemble.points, &ensemble.runs)
+}
+
+/// Like [`refuse`], for the points of runs of these names.
+pub(in crate::stage) fn refuse_points(
+    study: &Study,
+    points: &Matrix,
+    runs: &[String],
+) -> Result<(), Stop> {
     let keys = study.simulations.as_ref().map(|section| section.common.outside_design);
     if keys == Some(OutsideDesign::Allow) {
         return Ok(());
     }
-    let outside = runs(&study.parameters, ensemble);
+    let outside = among(&study.parameters, points);
     let Some(first) = outside.first() else { return Ok(()) };
     let mut rows: Vec<usize> = outside.iter().map(|o| o.run).collect();
     rows.dedup();
-    let (count, of) = (rows.len(), ensemble.runs.len());
+    let (count, of) = (rows.len(), runs.len());
     let parameter = &study.parameters[first.parameter];
     let (low, high) = limits(parameter);
-    let (name, run, value) = (&parameter.name, &ensemble.runs[first.run], first.value);
+    let (name, run, value) = (&parameter.name, &runs[first.run], first.value);
     let place = place(study, run, value).map_or_else(String::new, |place| format!(" ({place})"));
+    let value = if value.abs() < 1e16 { value.to_string() } else { format!("{value:e}") };
     let are = if count == 1 { "lies" } else { "lie" };
     let message = format!(
         "{count} of {of} runs {are} outside the declared design; the first is run `{run}`{place}: `{name}` is \
@@ -125,7 +140,6 @@ mod tests {
     use super::*;
     use lacuna::data::{Layout, Unit};
     use lacuna::math::distribution::Distribution;
-    use lacuna_linalg::Matrix;
 
     fn of(design: Distribution, values: &[f64]) -> Vec<f64> {
         let parameter = Parameter {
