@@ -115,6 +115,43 @@ fn the_table_of_measurements_is_read_back_to_the_same_bits() {
     assert_eq!(again, read(&[]));
 }
 
+#[cfg(unix)]
+#[test]
+fn tables_go_through_links_and_into_what_is_no_file() {
+    let folder = quick::tables();
+    let at = |name: &str| folder.path().join(name);
+    let succeed = |command: &mut Command| {
+        let done = command.output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    };
+    let convert =
+        |out: &str| succeed(quick::command().arg("convert").args([at("study.toml"), at(out)]));
+    let inspect = |out: &str| {
+        let sample = quick::root().join("tests/samples/base.csv");
+        let mut command = quick::command();
+        command.arg("inspect").arg(sample).args(["--variable", "B", "--csv"]).arg(at(out));
+        succeed(&mut command);
+    };
+    convert("long.csv");
+    inspect("signal.csv");
+    fs::write(at("target.csv"), "old").unwrap();
+    std::os::unix::fs::symlink("target.csv", at("link.csv")).unwrap();
+    succeed(Command::new("mkfifo").arg(at("fifo.csv")));
+    for is_table in [true, false] {
+        let (plain, way): (&str, &dyn Fn(&str)) =
+            if is_table { ("long.csv", &convert) } else { ("signal.csv", &inspect) };
+        let right = fs::read(at(plain)).unwrap();
+        way("link.csv");
+        assert_eq!(fs::read(at("target.csv")).unwrap(), right);
+        assert!(fs::symlink_metadata(at("link.csv")).unwrap().is_symlink());
+        let fifo = at("fifo.csv");
+        let reading = std::thread::spawn(move || fs::read(fifo).unwrap());
+        way("fifo.csv");
+        assert_eq!(reading.join().unwrap(), right);
+        assert!(!fs::metadata(at("fifo.csv")).unwrap().is_file());
+    }
+}
+
 #[test]
 fn what_has_no_draws_is_refused() {
     let folder = tempfile::tempdir().unwrap();

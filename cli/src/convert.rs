@@ -17,6 +17,7 @@ use lacuna_run::RunDirectory;
 
 use self::table::{Cells, Column};
 use crate::study::{self, Settings};
+use crate::terminal::print_data;
 use crate::{misuse, print, progress};
 
 /// File of a run directory with the draws.
@@ -48,7 +49,7 @@ pub fn convert(source: &Path, settings: &Settings, out: &Path) -> anyhow::Result
         return Err(misuse(text));
     };
     if out == Path::new("-") {
-        print(table::csv(&columns).trim_end());
+        print_data(table::csv(&columns).trim_end());
         return Ok(());
     }
     let bytes = match format {
@@ -58,7 +59,7 @@ pub fn convert(source: &Path, settings: &Settings, out: &Path) -> anyhow::Result
             parquet::file(&columns)
         }
     };
-    files::write_atomic(out, &bytes)?;
+    files::write_named(out, &bytes)?;
     print(&format!("wrote {}", out.display()));
     Ok(())
 }

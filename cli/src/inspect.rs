@@ -11,6 +11,7 @@ use lacuna::run::{Stop, files};
 use lacuna::text::nearest::nearest;
 
 use crate::plugins::Libraries;
+use crate::terminal::print_data;
 use crate::{misuse, plugins, print};
 
 /// Runs `lacuna inspect FILE`.
@@ -70,10 +71,14 @@ fn build(name: &str) -> anyhow::Result<Box<dyn Reader>> {
     Ok(built.plugin)
 }
 
+/// Width of a column above which longer cells shift the cells to their right.
+const WIDEST: usize = 60;
+
 fn table(variables: &[&Variable]) {
     let mut rows = vec![["variable", "on", "axes", "unit", "range"].map(str::to_owned)];
     rows.extend(variables.iter().map(|v| row(v)));
-    let width = |j: usize| rows.iter().map(|row| row[j].chars().count()).max().unwrap_or(0);
+    let longest = |j: usize| rows.iter().map(|row| row[j].chars().count()).max().unwrap_or(0);
+    let width = |j: usize| longest(j).min(WIDEST);
     let widths = [0, 1, 2, 3].map(width);
     for row in &rows {
         let cells = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}  "));
@@ -110,10 +115,10 @@ fn write_csv(variables: &[&Variable], out: &Path) -> anyhow::Result<()> {
     let text: Vec<String> = variables.iter().map(|v| csv(&v.signals)).collect();
     let text = text.join("\n");
     if out == Path::new("-") {
-        print(text.trim_end());
+        print_data(text.trim_end());
         return Ok(());
     }
-    files::write_atomic(out, text.as_bytes())?;
+    files::write_named(out, text.as_bytes())?;
     print(&format!("wrote {}", out.display()));
     Ok(())
 }

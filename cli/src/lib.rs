@@ -40,7 +40,8 @@ struct Arguments {
     verb: Verb,
     /// Number of threads (default: all cores); affects the run time, not the results
     #[arg(long, global = true, value_name = "N")]
-    threads: Option<std::num::NonZeroUsize>,
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
     /// For programs: print JSON, one event a line (stages, progress, warnings, results, the end with its exit code)
     #[arg(long, global = true)]
     events: bool,
@@ -242,13 +243,14 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version go to standard output, with the code 0.
-            let _ = error.print();
-            return u8::try_from(error.exit_code()).unwrap_or(2);
+            terminal::note(error.print());
+            let code = u8::try_from(error.exit_code()).unwrap_or(2);
+            return if terminal::has_failed() { code.max(1) } else { code };
         }
     };
     if let Some(threads) = arguments.threads {
         // Only this line ever builds the pool, so it cannot fail because a pool already exists.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global();
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
     }
     if arguments.events {
         events::turn_on();

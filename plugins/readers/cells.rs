@@ -38,8 +38,10 @@ impl<'a> Places<'a> {
         match &axis.coordinates {
             Coordinates::Labels(labels) => {
                 let known = self.labels.get_or_init(|| {
-                    // The first of equal labels is kept.
-                    labels.iter().enumerate().rev().map(|(i, label)| (&label[..], i)).collect()
+                    // The first of equal labels is kept. Readers leave out the blanks about a text.
+                    let all = || labels.iter().enumerate().rev();
+                    let bare = all().map(|(i, label)| (label.trim(), i));
+                    bare.chain(all().map(|(i, label)| (&label[..], i))).collect()
                 });
                 known.get(text).copied().ok_or_else(|| {
                     format!("unknown {} `{text}`; the response has {}", axis.name, listed(labels))

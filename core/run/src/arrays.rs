@@ -3,6 +3,8 @@
 mod classic;
 
 use std::borrow::Cow;
+use std::fs::File;
+use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
 
 use lacuna::data::{Axis, Coordinates, Layout};
@@ -51,13 +53,36 @@ const LARGE: usize = 1 << 20;
 
 /// Writes arrays and text attributes as a classic netCDF file with 64-bit offsets.
 pub fn write(path: &Path, attributes: &[(&str, String)], arrays: &[Array<'_>]) -> Result<(), Stop> {
+    files::write_atomic_with(path, filling(path, attributes, arrays)?)
+}
+
+/// Like [`write()`], to a path that a user names: see [`files::write_named`].
+pub fn write_named(
+    path: &Path,
+    attributes: &[(&str, String)],
+    arrays: &[Array<'_>],
+) -> Result<(), Stop> {
+    files::write_named_with(path, filling(path, attributes, arrays)?)
+}
+
+/// Function that fills the file.
+fn filling(
+    path: &Path,
+    attributes: &[(&str, String)],
+    arrays: &[Array<'_>],
+) -> Result<impl FnOnce(&mut BufWriter<File>) -> io::Result<()>, Stop> {
     let count: usize = arrays.iter().map(|array| array.values.len()).sum();
-    if count >= LARGE && classic::is_possible(arrays) {
-        return files::write_atomic_with(path, |file| classic::write(file, attributes, arrays));
-    }
-    let bytes = by_library(attributes, arrays)
-        .map_err(|error| Stop::new(format!("cannot write {}: {error}", path.display())))?;
-    files::write_atomic(path, &bytes)
+    let bytes = if count >= LARGE && classic::is_possible(arrays) {
+        None
+    } else {
+        let bytes = by_library(attributes, arrays)
+            .map_err(|error| Stop::new(format!("cannot write {}: {error}", path.display())))?;
+        Some(bytes)
+    };
+    Ok(move |file: &mut BufWriter<File>| match bytes {
+        Some(bytes) => file.write_all(&bytes),
+        None => classic::write(file, attributes, arrays),
+    })
 }
 
 /// The bytes of the file, by the library.

@@ -126,7 +126,9 @@ fn files_of_the_simulate_stage_are_read_back() {
 /// Labels of a study may have blanks, begin with a bracket, or look like numbers.
 #[test]
 fn labels_with_blanks_come_back() {
-    for labels in [["top left", "top right"], ["[a", "b"], ["1", "2"], ["\"a\" b", "c,d"]] {
+    for labels in
+        [["top left", "top right"], ["[a", "b"], ["1", "2"], ["\"a\" b", "c,d"], [" top", "side "]]
+    {
         let folder = tempfile::tempdir().unwrap();
         let axes = vec![Axis::labels("sensor", labels)];
         let layout = Layout { name: "strain".into(), unit: unit("1"), axes };

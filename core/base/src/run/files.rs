@@ -1,8 +1,8 @@
 //! Files that are written either completely or not at all.
 
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, IntoInnerError, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -11,7 +11,8 @@ use sha2::{Digest, Sha256};
 use super::Stop;
 
 /// Writes a file so that a reader, or a later run, sees either the old content or the complete new one: temporary file
-/// in the same folder, flushed to disk, renamed.
+/// in the same folder, flushed to disk, renamed. A symbolic link of this name is replaced, so that nothing outside a run
+/// directory is written through it; [`write_named`] is for files that a user names.
 ///
 /// # Errors
 /// If the file cannot be written; the temporary file is removed.
@@ -24,24 +25,88 @@ pub fn write_atomic_with(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), Stop> {
-    let write = || -> io::Result<()> {
-        let folder = path.parent().unwrap_or(Path::new("."));
-        fs::create_dir_all(folder)?;
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let temporary = folder.join(format!(".{name}.part"));
-        let result = File::create(&temporary).and_then(|file| {
-            let mut file = BufWriter::new(file);
-            write(&mut file)?;
-            file.into_inner().map_err(IntoInnerError::into_error)?.sync_all()
-        });
-        if let Err(error) = result {
-            // The incomplete file is removed on a best-effort basis; the error worth reporting is the first one.
-            let _ = fs::remove_file(&temporary);
-            return Err(error);
-        }
+    replace(path, write).map_err(|error| cannot_write(path, &error))
+}
+
+fn replace(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let temporary = folder.join(format!(".{name}.part"));
+    let result = File::create(&temporary).and_then(|file| {
+        let mut file = BufWriter::new(file);
+        write(&mut file)?;
+        file.into_inner().map_err(IntoInnerError::into_error)?.sync_all()?;
         fs::rename(&temporary, path)
+    });
+    if result.is_err() {
+        // The incomplete file is removed on a best-effort basis; the error worth reporting is the first one.
+        let _ = fs::remove_file(&temporary);
+    }
+    result
+}
+
+/// Writes a file that a user names. Symbolic links are followed: what they lead to is written as by [`write_atomic`], beside
+/// itself. Where something exists that is no regular file, such as a device or a FIFO, the bytes are written into it.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_named(path: &Path, bytes: &[u8]) -> Result<(), Stop> {
+    write_named_with(path, |file| file.write_all(bytes))
+}
+
+/// Like [`write_named`], with a file that `write` fills.
+pub fn write_named_with(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), Stop> {
+    let written = match destination(path) {
+        Ok(Destination::File(file)) => replace(&file, write),
+        Ok(Destination::Stream) => into_stream(path, write),
+        Err(error) => Err(error),
     };
-    write().map_err(|error| cannot_write(path, &error))
+    written.map_err(|error| cannot_write(path, &error))
+}
+
+/// Kind of place to which a path of a user leads.
+enum Destination {
+    /// A regular file, or none so far, without links.
+    File(PathBuf),
+    /// Something that is written straight into: a device, a FIFO, an open file of this process.
+    Stream,
+}
+
+/// Largest number of symbolic links that lead to a file, as Linux has it.
+const LINKS: usize = 40;
+
+fn destination(path: &Path) -> io::Result<Destination> {
+    // A folder is left to the renaming, which refuses it.
+    if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return Ok(Destination::Stream);
+    }
+    let mut place = path.to_owned();
+    for _ in 0..LINKS {
+        // The links of open files, such as that of `/dev/stdout`, do not lead to names that can be replaced.
+        if ["/dev/fd", "/proc"].iter().any(|folder| place.starts_with(folder)) {
+            return Ok(Destination::Stream);
+        }
+        let Ok(target) = fs::read_link(&place) else { return Ok(Destination::File(place)) };
+        place = place.parent().map_or_else(|| target.clone(), |folder| folder.join(&target));
+    }
+    Err(io::Error::other("too many symbolic links"))
+}
+
+/// Writes into what exists. It is not waited for a disk, which a device or FIFO need not have.
+fn into_stream(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut file = BufWriter::new(OpenOptions::new().write(true).truncate(true).open(path)?);
+    write(&mut file)?;
+    file.flush()
 }
 
 /// Like [`write_atomic_with`]; returns the SHA-256 of the file, in hexadecimal, which another thread computes while pieces
@@ -182,7 +247,7 @@ pub fn hash_file(path: &Path) -> Result<String, Stop> {
 }
 
 /// SHA-256 over names and contents of files, and of the files directly inside folders.
-pub fn hash_sources(paths: &[std::path::PathBuf]) -> Result<String, Stop> {
+pub fn hash_sources(paths: &[PathBuf]) -> Result<String, Stop> {
     let mut lines = String::new();
     for path in paths {
         let files = if path.is_dir() { folder_files(path)? } else { vec![path.clone()] };
@@ -194,8 +259,8 @@ pub fn hash_sources(paths: &[std::path::PathBuf]) -> Result<String, Stop> {
     Ok(hash(lines.as_bytes()))
 }
 
-fn folder_files(folder: &Path) -> Result<Vec<std::path::PathBuf>, Stop> {
-    let list = || -> io::Result<Vec<std::path::PathBuf>> {
+fn folder_files(folder: &Path) -> Result<Vec<PathBuf>, Stop> {
+    let list = || -> io::Result<Vec<PathBuf>> {
         let mut files = Vec::new();
         for entry in fs::read_dir(folder)? {
             let path = entry?.path();
@@ -241,6 +306,64 @@ mod tests {
         fs::create_dir(folder.path().join(".a.json.part")).unwrap();
         assert!(write_json(&path, &[3]).is_err());
         assert_eq!(read_json::<Vec<i32>>(&path).unwrap(), [1, 2]);
+    }
+
+    #[test]
+    fn a_file_takes_the_place_of_no_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        fs::create_dir(&path).unwrap();
+        assert!(write_atomic(&path, b"x").is_err() && write_named(&path, b"x").is_err());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_for_a_user_and_replaced_in_a_run_directory() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("far")).unwrap();
+        fs::write(at("far/target"), "old").unwrap();
+        symlink("far/target", at("link")).unwrap();
+        symlink(at("link"), at("far/second")).unwrap();
+        symlink("far/none", at("dangling")).unwrap();
+        symlink("loop", at("loop")).unwrap();
+        for (path, target) in
+            [("far/second", "far/target"), ("dangling", "far/none"), ("plain", "plain")]
+        {
+            write_named(&at(path), path.as_bytes()).unwrap();
+            assert_eq!(fs::read(at(target)).unwrap(), path.as_bytes());
+        }
+        for link in ["link", "far/second", "dangling"] {
+            assert!(fs::symlink_metadata(at(link)).unwrap().is_symlink(), "{link}");
+        }
+        let error = write_named(&at("loop"), b"x").unwrap_err();
+        assert!(error.message.ends_with("loop: too many symbolic links"), "{}", error.message);
+        write_atomic(&at("link"), b"own").unwrap();
+        assert!(!fs::symlink_metadata(at("link")).unwrap().is_symlink());
+        assert_eq!(fs::read(at("far/target")).unwrap(), b"far/second");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_fifo_is_written_into() {
+        use std::os::unix::fs::{FileTypeExt as _, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let [fifo, link] = ["fifo", "link"].map(|name| folder.path().join(name));
+        let made = std::process::Command::new("mkfifo").arg(&fifo).status().unwrap();
+        assert!(made.success());
+        symlink("fifo", &link).unwrap();
+        for path in [&fifo, &link] {
+            let reading = std::thread::spawn({
+                let fifo = fifo.clone();
+                move || fs::read(fifo).unwrap()
+            });
+            write_named(path, b"1,2\n").unwrap();
+            assert_eq!(reading.join().unwrap(), b"1,2\n");
+        }
+        assert!(fs::symlink_metadata(&fifo).unwrap().file_type().is_fifo());
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
     }
 
     #[test]

@@ -68,7 +68,7 @@ fn write(study: &Study, tables: &Tables, emulated: &Emulated<'_>, out: &Path) ->
     own.column("high", "parameter", ends(|ends| ends.1));
     own.column("error_sd", "output", emulated.over_prior().to_vec());
     let arrays: Vec<Array<'_>> = own.arrays.iter().chain(&tables.arrays).map(array).collect();
-    arrays::write(out, &attributes, &arrays)
+    arrays::write_named(out, &attributes, &arrays)
 }
 
 fn array(table: &Table) -> Array<'_> {
