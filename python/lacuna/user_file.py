@@ -29,7 +29,10 @@ def load(path):
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    spec.loader.exec_module(module)
+    # Not by the loader: its compiled copy may be that of an earlier text of the same second and length.
+    with open(path, "rb") as file:
+        text = file.read()
+    exec(compile(text, path, "exec"), module.__dict__)
     return module
 
 
