@@ -1,12 +1,9 @@
 //! A killed study continues where it stopped, and ends with the bits of an uninterrupted run.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-
-use generator::noise;
 
 use crate::quick;
 
@@ -95,51 +92,13 @@ fn a_killed_study_ends_with_the_bits_it_would_have_had() {
 }
 
 /// An oscillation of 38 periods without an emulator: the evidence needs 2200 solutions of about a millisecond.
-const OSCILLATION: &str = r#"
-[study]
-title = "an oscillation"
-seed = 3
-
-[[parameter]]
-name = "w"
-unit = "1/s"
-prior = { uniform = [2.01, 2.03] }
-
-[response]
-name = "x"
-unit = "m"
-axes = { t = { measured = true, unit = "s" } }
-
-[model]
-use = "equations"
-state = { x = { start = "1 {m}", unit = "m" }, v = { start = "0 {m/s}", unit = "m/s" } }
-rate = { x = "v", v = "-w^2 * x" }
-observe = "x"
-solver = { relative_tolerance = 1e-10 }
-
-[measurements]
-use = "csv"
-path = "data.csv"
-
-[discrepancy]
-use = "gaussian"
-variance = { half_normal = 1.0 }
-
-[sampler]
-use = "affine_invariant_ensemble"
-walkers = 8
-steps = 120
-"#;
-
 fn oscillation(folder: &Path) {
-    let mut random = noise::Source::new(8);
-    let mut table = "t [s],x [m]\n".to_owned();
-    for i in 1..=300 {
-        let t = 0.4 * f64::from(i);
-        writeln!(table, "{t},{}", (2.02 * t).cos() + 0.1 * random.normal()).unwrap();
-    }
-    fs::write(folder.join("data.csv"), table).unwrap();
-    fs::write(folder.join("study.toml"), OSCILLATION).unwrap();
+    let parameter = "name = \"w\"\nunit = \"1/s\"\nprior = { uniform = [2.01, 2.03] }";
+    let model = "state = { x = { start = \"1 {m}\", unit = \"m\" }, v = { start = \"0 {m/s}\", unit = \"m/s\" } }\n\
+                 rate = { x = \"v\", v = \"-w^2 * x\" }\nobserve = \"x\"\n\
+                 solver = { relative_tolerance = 1e-10 }";
+    let sampler = "use = \"affine_invariant_ensemble\"\nwalkers = 8\nsteps = 120";
+    quick::oscillation(folder, [parameter, model, sampler], (300, 120.0), |t| (2.02 * t).cos());
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! Studies small enough for tests, and inspection of their run directories.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Mutex, OnceLock};
 
+use generator::noise;
 use lacuna::run::{Observer, Stop, files};
 use lacuna_engine::pipeline;
 use lacuna_engine::report::findings::Findings;
@@ -55,6 +57,30 @@ pub fn tables() -> TempDir {
         fs::copy(from, folder.path().join(file)).unwrap();
     }
     folder
+}
+
+/// Writes a study of one parameter with measurements of `curve` at `points` times up to `length`, with noise of standard
+/// deviation 0.1. The sections `[[parameter]]`, `[model]` and `[sampler]` are given.
+pub fn oscillation(
+    folder: &Path,
+    [parameter, model, sampler]: [&str; 3],
+    (points, length): (usize, f64),
+    curve: impl Fn(f64) -> f64,
+) {
+    let mut random = noise::Source::new(8);
+    let mut table = "t [s],x [m]\n".to_owned();
+    for i in 1..=points {
+        let t = length * i as f64 / points as f64;
+        writeln!(table, "{t},{}", curve(t) + 0.1 * random.normal()).unwrap();
+    }
+    fs::write(folder.join("data.csv"), table).unwrap();
+    let study = format!(
+        "[study]\ntitle = \"an oscillation\"\nseed = 3\n\n[[parameter]]\n{parameter}\n\n\
+         [response]\nname = \"x\"\nunit = \"m\"\naxes = {{ t = {{ measured = true, unit = \"s\" }} }}\n\n\
+         [model]\nuse = \"equations\"\n{model}\n\n[measurements]\nuse = \"csv\"\npath = \"data.csv\"\n\n\
+         [discrepancy]\nuse = \"gaussian\"\nvariance = {{ half_normal = 1.0 }}\n\n[sampler]\n{sampler}\n"
+    );
+    fs::write(folder.join("study.toml"), study).unwrap();
 }
 
 /// Replaces a text that must be present in a file of a study.

@@ -3,10 +3,7 @@
 //!
 //! The model is the truth, `sin(f t)`: what is tested is the search.
 
-use std::fmt::Write as _;
 use std::fs;
-
-use generator::noise;
 
 use crate::quick;
 
@@ -15,51 +12,14 @@ const POINTS: usize = 500;
 const LENGTH: f64 = 40.0;
 const NOISE: f64 = 0.1;
 
-const STUDY: &str = r#"
-[study]
-title = "a wave"
-seed = 3
-
-[[parameter]]
-name = "f"
-unit = "1/s"
-prior = { uniform = [5.0, 100.0] }
-
-[response]
-name = "x"
-unit = "m"
-axes = { t = { measured = true, unit = "s" } }
-
-[model]
-use = "equations"
-observe = "sin(f * t) * 1 {m}"
-
-[measurements]
-use = "csv"
-path = "data.csv"
-
-[discrepancy]
-use = "gaussian"
-variance = { half_normal = 1.0 }
-
-[sampler]
-use = "no_u_turn"
-warm_up = 20
-steps = 40
-chains = 2
-"#;
-
 /// The MAP of the frequency with further sections of the study.
 fn map(more: &str) -> f64 {
-    let mut random = noise::Source::new(8);
-    let mut table = "t [s],x [m]\n".to_owned();
-    for i in 1..=POINTS {
-        let t = LENGTH * i as f64 / POINTS as f64;
-        writeln!(table, "{t},{}", (FREQUENCY * t).sin() + NOISE * random.normal()).unwrap();
-    }
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("data.csv"), table).unwrap();
-    fs::write(folder.path().join("study.toml"), STUDY.to_owned() + more).unwrap();
+    let parameter = "name = \"f\"\nunit = \"1/s\"\nprior = { uniform = [5.0, 100.0] }";
+    let model = "observe = \"sin(f * t) * 1 {m}\"";
+    let sampler = format!("use = \"no_u_turn\"\nwarm_up = 20\nsteps = 40\nchains = 2\n{more}");
+    let sections = [parameter, model, &sampler];
+    quick::oscillation(folder.path(), sections, (POINTS, LENGTH), |t| (FREQUENCY * t).sin());
     let path = folder.path().join("study.toml");
     let out = folder.path().join("out");
     quick::run(&path, &[], &out).unwrap_or_else(|stop| panic!("{stop}"));
