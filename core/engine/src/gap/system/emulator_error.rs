@@ -177,9 +177,10 @@ fn score(white: &Matrix, target: &[f64], share: f64) -> Option<f64> {
     let c = (1.0 - share) / (count as f64 - 1.0);
     let own: Vec<f64> = target.iter().map(|t| 1.0 + share * t).collect();
     let over = |power: f64| {
+        let factors: Vec<f64> = own.iter().map(|d| d.powf(-0.5 * power)).collect();
         let mut scaled = white.clone();
         for k in 0..count {
-            scaled.row_mut(k).iter_mut().zip(&own).for_each(|(x, d)| *x *= d.powf(-0.5 * power));
+            scaled.row_mut(k).iter_mut().zip(&factors).for_each(|(x, factor)| *x *= factor);
         }
         multiply_transposed(&scaled, &scaled)
     };

@@ -29,8 +29,9 @@ const FEWEST: usize = 4;
 pub struct Shifts<'a> {
     curves: &'a Curves,
     size: &'a Size,
-    places: &'a Places,
     outputs: Vec<usize>,
+    /// Damping of the correlations among the selected outputs.
+    damping: Matrix,
     /// Standard deviation of the noise of what was measured, by selected output.
     noise: Vec<f64>,
     /// Curves divided by their sizes and the noise, at the selected outputs.
@@ -51,7 +52,7 @@ impl<'a> Shifts<'a> {
     /// where nothing was.
     ///
     /// A subset of the outputs carries less information than all; their noise is reduced to compensate.
-    pub fn of(curves: &'a Curves, size: &'a Size, places: &'a Places, noise: &[f64]) -> Self {
+    pub fn of(curves: &'a Curves, size: &'a Size, places: &Places, noise: &[f64]) -> Self {
         let measured: Vec<usize> = (0..noise.len()).filter(|&j| !noise[j].is_nan()).collect();
         let outputs: Vec<usize> =
             thinned(measured.len(), OUTPUTS).into_iter().map(|k| measured[k]).collect();
@@ -59,7 +60,8 @@ impl<'a> Shifts<'a> {
         // restores it.
         let share = outputs.len() as f64 / measured.len().max(1) as f64;
         let noise: Vec<f64> = outputs.iter().map(|&j| (share * noise[j]).sqrt()).collect();
-        let mut judged = Self { curves, size, places, outputs, noise, white: Matrix::zeros(0, 0) };
+        let (damping, white) = (places.among(&outputs), Matrix::zeros(0, 0));
+        let mut judged = Self { curves, size, outputs, damping, noise, white };
         judged.white = judged.whitened(|i, j| curves.errors[(i, j)] / size.at_curves[i]);
         judged
     }
@@ -86,7 +88,7 @@ impl<'a> Shifts<'a> {
         let products = transposed_multiply(white, white);
         let count = white.rows().max(1) as f64;
         Matrix::from_fn(self.outputs.len(), self.outputs.len(), |i, j| {
-            products[(i, j)] / count * self.places.damping(self.outputs[i], self.outputs[j])
+            products[(i, j)] / count * self.damping[(i, j)]
         })
     }
 

@@ -54,10 +54,21 @@ impl Places {
         for k in 0..a.len().max(b.len()) {
             let missing = (0.0, 0);
             let (x, y) = (a.get(k).unwrap_or(&missing), b.get(k).unwrap_or(&missing));
-            product *= (-0.5 * ((x.0 - y.0) / LENGTH).powi(2)).exp();
+            if x.0 != y.0 {
+                product *= (-0.5 * ((x.0 - y.0) / LENGTH).powi(2)).exp();
+            }
             product *= if x.1 == y.1 { 1.0 } else { APART };
         }
         product
+    }
+
+    /// Damping of the correlations among some outputs.
+    pub fn among(&self, outputs: &[usize]) -> Matrix {
+        let below = |i: usize| -> Vec<f64> {
+            outputs[..=i].iter().map(|&j| self.damping(outputs[i], j)).collect()
+        };
+        let lower: Vec<Vec<f64>> = (0..outputs.len()).into_par_iter().map(below).collect();
+        Matrix::from_fn(outputs.len(), outputs.len(), |i, j| lower[i.max(j)][i.min(j)])
     }
 
     /// Covariance of some curves, one per row and multiplied by its own scale, as a factor of low rank,
@@ -81,10 +92,9 @@ impl Places {
     /// Directions of the covariance of the curves at few outputs, each divided by its standard deviation.
     fn directions(&self, known: &Matrix, few: &[usize], noise: &[f64]) -> Result<Matrix, Stop> {
         let count = known.rows().max(1) as f64;
-        let among = transposed_multiply(known, known);
-        let among = Matrix::from_fn(few.len(), few.len(), |i, j| {
-            among[(i, j)] / count * self.damping(few[i], few[j])
-        });
+        let (among, damping) = (transposed_multiply(known, known), self.among(few));
+        let among =
+            Matrix::from_fn(few.len(), few.len(), |i, j| among[(i, j)] / count * damping[(i, j)]);
         let eigen = symmetric_eigen(&among)
             .map_err(|e| Stop::new(format!("the covariance of the emulator's error: {e}")))?;
         let least = noise.iter().copied().filter(|v| !v.is_nan()).fold(f64::INFINITY, f64::min);
