@@ -1,5 +1,6 @@
 //! Likelihood in the sufficient statistics of the replicates.
 
+use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
 
 use lacuna::data::Measurements;
@@ -19,7 +20,7 @@ use super::compressed::CompressedGaussian;
 use super::law::{Coupled, Law};
 use super::memory::Memory;
 use super::statistics::{Directions, Residual, Spread, Statistics};
-use crate::discrepancies::common::{Noise, Normal, Replicates, conditional, values};
+use crate::discrepancies::common::{Noise, Normal, Replicates, values};
 
 /// The likelihood (see the module).
 pub(super) struct GaussianLikelihood {
@@ -195,13 +196,18 @@ impl GaussianLikelihood {
     ) -> f64 {
         let scale = scale[group.measured[k]];
         let count = group.weight[k].powi(2) * scale;
+        let (own, root) = (difference / scale.sqrt(), count.sqrt());
         // With an uncertain variance, the density of a value given the others is the reciprocal of the mean of its
-        // reciprocal density over the variance.
-        let inverse = |(n, &(v, p)): (usize, &(f64, f64))| {
-            let pull = (difference / scale.sqrt() - common[(n, k)] / count.sqrt()) / v;
-            p * (-conditional(pull, (1.0 - shrink[(n, k)] / count) / v)).exp()
+        // reciprocal density over the variance: here its exponent and the factor before it, at each variance.
+        let reciprocal = |(n, &(v, p)): (usize, &(f64, f64))| {
+            let pull = (own - common[(n, k)] / root) / v;
+            let precision = (1.0 - shrink[(n, k)] / count) / v;
+            (0.5 * pull * pull / precision, p * (TAU / precision).sqrt())
         };
-        -nodes.iter().enumerate().map(inverse).sum::<f64>().ln() - 0.5 * scale.ln()
+        let all = || nodes.iter().enumerate().map(reciprocal);
+        let largest = all().fold(f64::NEG_INFINITY, |largest, (exponent, _)| largest.max(exponent));
+        let sum: f64 = all().map(|(exponent, p)| p * (exponent - largest).exp()).sum();
+        -largest - sum.ln() - 0.5 * scale.ln()
     }
 }
 

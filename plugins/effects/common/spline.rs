@@ -11,6 +11,8 @@ use lacuna::plugin::effect::grid;
 pub struct Knots<'a> {
     /// The grid.
     pub at: &'a [f64],
+    /// The inverse widths of the intervals.
+    steps: Vec<f64>,
     /// The pivots of the elimination, one an inner point.
     pivots: Vec<f64>,
 }
@@ -23,13 +25,14 @@ impl<'a> Knots<'a> {
 
     /// On a grid.
     pub fn on(at: &'a [f64]) -> Self {
+        let steps: Vec<f64> = at.windows(2).map(|w| 1.0 / (w[1] - w[0])).collect();
         let mut pivots: Vec<f64> = Vec::with_capacity(at.len());
-        for w in at.windows(3) {
-            let (before, after) = (1.0 / (w[1] - w[0]), 1.0 / (w[2] - w[1]));
+        for w in steps.windows(2) {
+            let (before, after) = (w[0], w[1]);
             let pivot = 2.0 * (before + after);
             pivots.push(pivots.last().map_or(pivot, |last| pivot - before * before / last));
         }
-        Self { at, pivots }
+        Self { at, steps, pivots }
     }
 
     /// The slopes at the points of a curve.
@@ -41,7 +44,7 @@ impl<'a> Knots<'a> {
         }
         slopes[0] = end_slope(self.at, values, |k| k);
         slopes[n - 1] = end_slope(self.at, values, |k| n - 1 - k);
-        let step = |i: usize| 1.0 / (self.at[i + 1] - self.at[i]);
+        let step = |i: usize| self.steps[i];
         let rise = |i: usize| 3.0 * step(i) * step(i) * (values[i + 1] - values[i]);
         for i in 1..n - 1 {
             // The row before is eliminated from this one; the slopes at the ends are known.

@@ -5,7 +5,7 @@ use lacuna_linalg::{
     Cholesky, Matrix, gram, multiply_vector, symmetric_eigen, transposed_multiply_vector,
 };
 
-use crate::gap::system::coordinate::{slope, unit};
+use crate::gap::system::coordinate::Coordinate;
 
 /// The number of sizes that are tried, from a thousandth to a hundred times a unit.
 const SIZES: usize = 31;
@@ -59,8 +59,9 @@ impl Pull {
     /// The priors about a point, with the slopes and widths of the coordinates in which a fit searches.
     pub fn of(priors: &[Distribution], point: &[f64]) -> Self {
         let each = priors.iter().zip(point).map(|(prior, &x)| {
-            let precision = unit(prior, x).powi(-2);
-            (precision, slope(prior, x) / precision)
+            let coordinate = Coordinate::of(prior);
+            let precision = coordinate.unit(x).powi(-2);
+            (precision, coordinate.slope(x) / precision)
         });
         let (precisions, shifts) = each.unzip();
         Self { precisions, shifts }

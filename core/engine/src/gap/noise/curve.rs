@@ -1,10 +1,10 @@
 //! The noise of one curve, from the differences between its replicates.
 
-use lacuna_linalg::{Cholesky, Matrix};
 use serde::{Deserialize, Serialize};
 
 use super::autoregression::Autoregression;
 use super::expectation::Expectation;
+use super::square::{Factor, square};
 use super::succession::Succession;
 use crate::gap::experiment::MeasuredCurve;
 
@@ -126,21 +126,14 @@ impl Differences {
     /// The coefficients of each difference on the three random effects, by least squares weighted with the noise.
     pub fn coefficients(&self, noise: &CurveNoise) -> Vec<[f64; 3]> {
         let fit = Expectation::of(self, noise);
-        let normal = Matrix::from_fn(3, 3, |i, j| {
-            fit.gram[(i, j)] * if i == j { 1.0 + 1e-9 } else { 1.0 }
+        let normal = square(|i, j| {
+            fit.gram[i][j] * if i == j { 1.0 + 1e-9 } else { 1.0 }
                 + if i == j { f64::MIN_POSITIVE } else { 0.0 }
         });
-        let Ok(factor) = Cholesky::new(&normal) else {
+        let Some(factor) = Factor::new(&normal) else {
             return vec![[0.0; 3]; self.contrasts.len()];
         };
-        fit.whitened
-            .iter()
-            .map(|c| {
-                let mut b = fit.onto(c);
-                factor.solve(&mut b);
-                [b[0], b[1], b[2]]
-            })
-            .collect()
+        fit.whitened.iter().map(|c| factor.solve(fit.onto(c))).collect()
     }
 }
 

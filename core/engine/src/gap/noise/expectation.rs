@@ -2,11 +2,11 @@
 //! Statistical Society B 39 (1977) 1).
 
 use lacuna_linalg::vector::{add_scaled, dot};
-use lacuna_linalg::{Cholesky, Matrix};
 
 use super::autoregression::Autoregression;
 use super::curve::{CurveNoise, Differences, ReplicateVariation};
 use super::products::Products;
+use super::square::{self, Factor, Square, square};
 
 /// Number of steps of expectation and maximisation, after which the log-likelihood rises by less than 0.01 per step.
 const STEPS: usize = 20;
@@ -27,7 +27,7 @@ pub(super) struct Expectation<'a> {
     pub whitened: Vec<Vec<f64>>,
     directions: Vec<Vec<f64>>,
     /// The products of the whitened directions.
-    pub gram: Matrix,
+    pub gram: Square,
     /// The products of each whitened difference with the whitened directions.
     onto: Vec<[f64; 3]>,
     products: Products,
@@ -54,7 +54,7 @@ impl<'a> Expectation<'a> {
             wander,
             whitened: Vec::new(),
             directions: Vec::new(),
-            gram: Matrix::zeros(3, 3),
+            gram: [[0.0; 3]; 3],
             onto: Vec::new(),
             products: Products::default(),
         };
@@ -88,7 +88,7 @@ impl<'a> Expectation<'a> {
         };
         let whitened = white(self.scaled(&self.data.contrasts));
         let directions = white(self.scaled(&self.data.directions));
-        self.gram = Matrix::from_fn(3, 3, |i, j| dot(&directions[i], &directions[j]));
+        self.gram = square(|i, j| dot(&directions[i], &directions[j]));
         (self.whitened, self.directions) = (whitened, directions);
     }
 
@@ -104,22 +104,28 @@ impl<'a> Expectation<'a> {
     fn project(&mut self) {
         let (products, memory) = (&self.products, &self.memory);
         let gram = |i: usize, j: usize| products.directions[i][j].whitened(memory);
-        self.gram = Matrix::from_fn(3, 3, gram);
+        self.gram = square(gram);
         let onto = products.mixed.iter().map(|p| [0, 1, 2].map(|i| p[i].whitened(memory)));
         self.onto = onto.collect();
     }
 
-    pub fn onto(&self, whitened: &[f64]) -> Vec<f64> {
-        self.directions.iter().map(|d| dot(d, whitened)).collect()
+    pub fn onto(&self, whitened: &[f64]) -> [f64; 3] {
+        [0, 1, 2].map(|k| dot(&self.directions[k], whitened))
+    }
+
+    /// The products with the directions, in units of the random effects, over the variance of the innovations.
+    fn scaled_onto(&self, whitened: &[f64], sd: &[f64; 3]) -> [f64; 3] {
+        let onto = self.onto(whitened);
+        [0, 1, 2].map(|k| onto[k] * (sd[k] / self.variance))
     }
 
     /// The matrix `I + V' G V / variance` with `V` the standard deviations of the random effects.
-    fn inner(&self) -> (Matrix, [f64; 3]) {
+    fn inner(&self) -> (Square, [f64; 3]) {
         let sd = self.wander.map(f64::sqrt);
         let entry = |i: usize, j: usize| {
-            f64::from(u8::from(i == j)) + sd[i] * self.gram[(i, j)] * sd[j] / self.variance
+            f64::from(u8::from(i == j)) + sd[i] * self.gram[i][j] * sd[j] / self.variance
         };
-        (Matrix::from_fn(3, 3, entry), sd)
+        (square(entry), sd)
     }
 
     pub fn run(mut self) -> Self {
@@ -140,34 +146,33 @@ impl<'a> Expectation<'a> {
     /// One step: the expected coefficients of the directions, then the noise that remains.
     fn improve(&mut self) {
         let (inner, sd) = self.inner();
-        let Ok(factor) = Cholesky::new(&inner) else { return };
+        let Some(factor) = Factor::new(&inner) else { return };
         let inverse = factor.inverse();
-        let posterior = Matrix::from_fn(3, 3, |i, j| sd[i] * inverse[(i, j)] * sd[j]);
+        let posterior = square(|i, j| sd[i] * inverse[i][j] * sd[j]);
         let n = self.onto.len() as f64;
         let length = self.data.response.len();
         let shares = self.onto.iter().map(|onto| -> [f64; 3] {
-            [0, 1, 2].map(|i| dot(posterior.row(i), onto) / self.variance)
+            posterior.map(|row| square::dot(&row, onto) / self.variance)
         });
         let shares: Vec<[f64; 3]> = shares.collect();
         // The second moments of the coefficients consist of the products of their expectations and of their posterior
         // covariance.
-        let expected = Matrix::from_fn(3, 3, |i, j| shares.iter().map(|s| s[i] * s[j]).sum());
-        let moments = Matrix::from_fn(3, 3, |i, j| expected[(i, j)] + n * posterior[(i, j)]);
+        let expected = |i: usize, j: usize| shares.iter().map(|s| s[i] * s[j]).sum::<f64>();
+        let moments = square(|i, j| expected(i, j) + n * posterior[i][j]);
         let products = &self.products;
         let covariance = |lag: usize| {
             let mut sum = products.own[lag];
             for (share, mixed) in shares.iter().zip(&products.mixed) {
                 sum -= (0..3).map(|i| share[i] * mixed[i].around(lag)).sum::<f64>();
             }
-            for i in 0..3 {
-                let row = &products.directions[i];
-                sum += (0..3).map(|j| moments[(i, j)] * row[j].lagged(lag)).sum::<f64>();
+            for (moments, row) in moments.iter().zip(&products.directions) {
+                sum += moments.iter().zip(row).map(|(m, own)| m * own.lagged(lag)).sum::<f64>();
             }
             sum / (n * (length - lag) as f64)
         };
         let covariances: Vec<f64> = (0..=self.order).map(covariance).collect();
         if n >= FEWEST as f64 {
-            (0..3).for_each(|i| self.wander[i] = moments[(i, i)] / n);
+            (0..3).for_each(|i| self.wander[i] = moments[i][i] / n);
         }
         let (memory, variance) = Autoregression::of_autocovariances(&covariances, self.order);
         if variance > 0.0 && variance.is_finite() {
@@ -179,11 +184,9 @@ impl<'a> Expectation<'a> {
     /// The whitened differences without the expected contributions of the directions.
     pub fn innovations(&self) -> Vec<Vec<f64>> {
         let (inner, sd) = self.inner();
-        let Ok(factor) = Cholesky::new(&inner) else { return self.whitened.clone() };
+        let Some(factor) = Factor::new(&inner) else { return self.whitened.clone() };
         let without = |whitened: &Vec<f64>| {
-            let mut share = self.onto(whitened);
-            share.iter_mut().zip(&sd).for_each(|(x, s)| *x *= s / self.variance);
-            factor.solve(&mut share);
+            let share = factor.solve(self.scaled_onto(whitened, &sd));
             let mut rest = whitened.clone();
             for ((direction, share), sd) in self.directions.iter().zip(&share).zip(&sd) {
                 add_scaled(&mut rest, -share * sd, direction);
@@ -223,7 +226,7 @@ impl<'a> Expectation<'a> {
     /// Minus twice the log-likelihood, with the penalty of the corrected Akaike criterion.
     pub fn criterion(&self) -> f64 {
         let (inner, sd) = self.inner();
-        let Ok(factor) = Cholesky::new(&inner) else { return f64::INFINITY };
+        let Some(factor) = Factor::new(&inner) else { return f64::INFINITY };
         let (n, length) = (self.whitened.len() as f64, self.data.response.len());
         let scale: f64 = self.profile.iter().map(|w| w.ln()).sum();
         let log_determinant = length as f64 * self.variance.ln()
@@ -231,9 +234,8 @@ impl<'a> Expectation<'a> {
             + factor.log_determinant();
         let mut quadratic = 0.0;
         for whitened in &self.whitened {
-            let mut onto = self.onto(whitened);
-            onto.iter_mut().zip(&sd).for_each(|(x, s)| *x *= s / self.variance);
-            quadratic += dot(whitened, whitened) / self.variance - factor.quadratic(&onto);
+            let onto = self.scaled_onto(whitened, &sd);
+            quadratic += dot(whitened, whitened) / self.variance - factor.quadratic(onto);
         }
         let unknowns = (self.order + 4) as f64;
         let count = n * length as f64;

@@ -18,6 +18,7 @@ mod restricted;
 mod shared;
 mod simulate;
 mod slow;
+mod square;
 mod stated;
 mod succession;
 #[cfg(test)]

@@ -4,7 +4,7 @@ use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Matrix, multiply_vector};
 
 use super::System;
-use super::coordinate::{inner, log_slope, moved, room, slope, unit};
+use super::coordinate::{inner, log_slope};
 use super::fit::{Fit, GAIN, at, residual};
 use super::step::within;
 use super::whitener::Whitener;
@@ -193,25 +193,25 @@ impl<'a, 'b> Ascent<'a, 'b> {
 /// density that the damped quadratic promises.
 fn step(system: &System<'_>, here: &Fit, damping: f64, bounds: &[(f64, f64)]) -> (Vec<f64>, f64) {
     let point = &here.at.point;
-    let priors = system.priors();
-    let unit: Vec<f64> = priors.iter().zip(point).map(|(prior, &x)| unit(prior, x)).collect();
+    let coordinates = system.coordinates();
+    let unit: Vec<f64> = coordinates.iter().zip(point).map(|(own, &x)| own.unit(x)).collect();
     let mut gradient = multiply_vector(&here.slopes, &here.residual);
     for (j, g) in gradient.iter_mut().enumerate() {
-        *g = (*g + slope(&priors[j], point[j])) * unit[j];
+        *g = (*g + coordinates[j].slope(point[j])) * unit[j];
     }
     let hessian = here.hessian();
     let damped = Matrix::from_fn(point.len(), point.len(), |i, j| {
         let value = unit[i] * hessian[(i, j)] * unit[j];
         if i == j { value * (1.0 + damping) + 1e-12 + damping } else { value }
     });
-    let room = (0..point.len()).map(|j| room(&priors[j], point[j], bounds[j]));
+    let room = (0..point.len()).map(|j| coordinates[j].room(point[j], bounds[j]));
     let (low, high): (Vec<f64>, Vec<f64>) = room.unzip();
     // Without a Cholesky factor there is no step, and the fit ends at the present point.
     let Some(shift) = within(&damped, &gradient, &low, &high) else {
         return (point.clone(), 0.0);
     };
     let promised = dot(&gradient, &shift) - 0.5 * dot(&shift, &multiply_vector(&damped, &shift));
-    let next = |j: usize| moved(&priors[j], point[j], shift[j]).clamp(bounds[j].0, bounds[j].1);
+    let next = |j: usize| coordinates[j].moved(point[j], shift[j]).clamp(bounds[j].0, bounds[j].1);
     ((0..point.len()).map(next).collect(), promised)
 }
 

@@ -20,12 +20,73 @@ fn in_logarithm(prior: &Distribution) -> bool {
     matches!(prior, Distribution::LogUniform(_) | Distribution::LogNormal(_))
 }
 
-/// The standard deviation of a prior in the coordinate in which its unknown is searched.
-fn width(prior: &Distribution) -> f64 {
-    match *prior {
-        Distribution::LogUniform([low, high]) => (high.ln() - low.ln()) / 12.0_f64.sqrt(),
-        Distribution::LogNormal([_, sigma]) => sigma,
-        _ => 1.0 / precision(prior).sqrt(),
+/// The coordinate in which an unknown is searched.
+#[derive(Debug, Clone)]
+pub(in crate::gap) struct Coordinate {
+    prior: Distribution,
+    /// The inverse of the standard deviation of the prior in the unknown itself.
+    precision_root: f64,
+    /// The standard deviation of the prior in the coordinate.
+    width: f64,
+}
+
+impl Coordinate {
+    /// The coordinate of an unknown with this prior.
+    pub fn of(prior: &Distribution) -> Self {
+        let precision_root = precision(prior).sqrt();
+        let width = match *prior {
+            Distribution::LogUniform([low, high]) => (high.ln() - low.ln()) / 12.0_f64.sqrt(),
+            Distribution::LogNormal([_, sigma]) => sigma,
+            _ => 1.0 / precision_root,
+        };
+        Self { prior: prior.clone(), precision_root, width }
+    }
+
+    /// The change of the unknown per width of its prior, at a value.
+    pub fn unit(&self, x: f64) -> f64 {
+        if in_logarithm(&self.prior) { self.width * x } else { self.width }
+    }
+
+    /// The slope of the log density of the prior in the coordinate, per unit of the unknown.
+    pub fn slope(&self, x: f64) -> f64 {
+        match self.prior {
+            Distribution::LogUniform(_) => 0.0,
+            Distribution::LogNormal([mu, sigma]) => (mu - x.ln()) / (sigma * sigma * x),
+            _ => self.prior.log_density_derivative(x),
+        }
+    }
+
+    /// The curvature of minus the log density of the prior in the coordinate, per squared unit of the unknown; zero if it
+    /// is negative.
+    pub fn curvature(&self, x: f64) -> f64 {
+        let prior = &self.prior;
+        if in_logarithm(prior) {
+            let normal = matches!(prior, Distribution::LogNormal(_));
+            return if normal { (self.width * x).powi(-2) } else { 0.0 };
+        }
+        let (low, high) = prior.support();
+        let step = 1e-4 / self.precision_root;
+        let (a, b) = ((x - step).max(low), (x + step).min(high));
+        let (left, right) = (prior.log_density_derivative(a), prior.log_density_derivative(b));
+        let curvature = (left - right) / (b - a);
+        if curvature.is_finite() { curvature.max(0.0) } else { 0.0 }
+    }
+
+    /// The value of the unknown after so many widths of its prior.
+    pub fn moved(&self, x: f64, widths: f64) -> f64 {
+        let shift = widths * self.width;
+        if in_logarithm(&self.prior) { x * shift.exp() } else { x + shift }
+    }
+
+    /// The lowest and the highest step that is allowed from a value inside its bounds, in widths of the prior.
+    pub fn room(&self, x: f64, (low, high): (f64, f64)) -> (f64, f64) {
+        let searched = in_logarithm(&self.prior);
+        let [below, above] = [low, high].map(|bound| {
+            if searched { (bound.max(0.0) / x).ln() / self.width } else { (bound - x) / self.width }
+        });
+        let limited = searched || (high - low).is_finite();
+        let farthest = if limited { FARTHEST } else { f64::INFINITY };
+        (below.max(-farthest).min(0.0), above.min(farthest).max(0.0))
     }
 }
 
@@ -33,54 +94,6 @@ fn width(prior: &Distribution) -> f64 {
 pub(in crate::gap) fn log_slope(priors: &[Distribution], point: &[f64]) -> f64 {
     let searched = priors.iter().zip(point).filter(|(prior, _)| in_logarithm(prior));
     searched.map(|(_, x)| x.ln()).sum()
-}
-
-/// The change of an unknown per width of its prior, at a value.
-pub(in crate::gap) fn unit(prior: &Distribution, x: f64) -> f64 {
-    if in_logarithm(prior) { width(prior) * x } else { width(prior) }
-}
-
-/// The slope of the log density of a prior in its coordinate, per unit of the unknown.
-pub(in crate::gap) fn slope(prior: &Distribution, x: f64) -> f64 {
-    match *prior {
-        Distribution::LogUniform(_) => 0.0,
-        Distribution::LogNormal([mu, sigma]) => (mu - x.ln()) / (sigma * sigma * x),
-        _ => prior.log_density_derivative(x),
-    }
-}
-
-/// The curvature of minus the log density of a prior in its coordinate, per squared unit of the unknown; zero if it is
-/// negative.
-pub(in crate::gap) fn curvature(prior: &Distribution, x: f64) -> f64 {
-    if in_logarithm(prior) {
-        let normal = matches!(prior, Distribution::LogNormal(_));
-        return if normal { (width(prior) * x).powi(-2) } else { 0.0 };
-    }
-    let (low, high) = prior.support();
-    let step = 1e-4 / precision(prior).sqrt();
-    let (a, b) = ((x - step).max(low), (x + step).min(high));
-    let (left, right) = (prior.log_density_derivative(a), prior.log_density_derivative(b));
-    let curvature = (left - right) / (b - a);
-    if curvature.is_finite() { curvature.max(0.0) } else { 0.0 }
-}
-
-/// The value of an unknown after so many widths of its prior.
-pub(in crate::gap) fn moved(prior: &Distribution, x: f64, widths: f64) -> f64 {
-    if in_logarithm(prior) { x * (widths * width(prior)).exp() } else { x + widths * width(prior) }
-}
-
-/// The lowest and the highest step that is allowed from a value inside its bounds, in widths of the prior.
-pub(in crate::gap) fn room(prior: &Distribution, x: f64, (low, high): (f64, f64)) -> (f64, f64) {
-    let [below, above] = [low, high].map(|bound| {
-        if in_logarithm(prior) {
-            (bound.max(0.0) / x).ln() / width(prior)
-        } else {
-            (bound - x) / width(prior)
-        }
-    });
-    let limited = in_logarithm(prior) || (high - low).is_finite();
-    let farthest = if limited { FARTHEST } else { f64::INFINITY };
-    (below.max(-farthest).min(0.0), above.min(farthest).max(0.0))
 }
 
 /// Bounds slightly inside those of a prior, where its density is finite.

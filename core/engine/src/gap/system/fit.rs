@@ -10,7 +10,6 @@ use lacuna_linalg::{Cholesky, Matrix, gram};
 use rayon::prelude::*;
 
 use super::ascent::{Ascent, HOPE};
-use super::coordinate::{curvature, unit};
 use super::noise_scale::NoiseScale;
 use super::whitener::Whitener;
 use super::window::Window;
@@ -276,9 +275,9 @@ pub fn at(system: &System<'_>, whitener: &Whitener, means: &[f64], point: &[f64]
     let finite = at.response.iter().all(|y| y.is_finite());
     let log_density =
         if finite { log_prior - 0.5 * dot(&residual, &residual) } else { f64::NEG_INFINITY };
-    let priors = system.priors();
-    let prior_curvature = priors.iter().zip(point).map(|(p, &x)| curvature(p, x)).collect();
-    let prior_precision = priors.iter().zip(point).map(|(p, &x)| unit(p, x).powi(-2)).collect();
+    let coordinates = || system.coordinates().iter().zip(point);
+    let prior_curvature = coordinates().map(|(own, &x)| own.curvature(x)).collect();
+    let prior_precision = coordinates().map(|(own, &x)| own.unit(x).powi(-2)).collect();
     let slopes = whitener.whiten_rows(&at.tangents);
     let noise_scale = whitener.noise_scale;
     Fit {

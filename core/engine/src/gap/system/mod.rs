@@ -19,6 +19,7 @@ use lacuna::plugin::effect::{Placed, with_tangents};
 use lacuna::plugin::forward::Wanted;
 use lacuna_linalg::Matrix;
 
+use self::coordinate::Coordinate;
 use self::fit::precision;
 use super::experiment::Experiment;
 use super::experiment::wider::ExtendedMap;
@@ -33,6 +34,7 @@ pub struct System<'a> {
     /// The effects: those on the response in the order in which they act.
     pub effects: Vec<Placed<'a>>,
     priors: Vec<Distribution>,
+    coordinates: Vec<Coordinate>,
     /// The outputs that are needed; `None` for all.
     needed: Option<Vec<bool>>,
 }
@@ -66,7 +68,8 @@ impl<'a> System<'a> {
         for effect in &effects {
             priors.extend(effect.hyperparameters().into_iter().map(|h| h.prior));
         }
-        Self { experiment, effects, priors, needed: None }
+        let coordinates = priors.iter().map(Coordinate::of).collect();
+        Self { experiment, effects, priors, coordinates, needed: None }
     }
 
     /// The system with one more effect.
@@ -90,6 +93,11 @@ impl<'a> System<'a> {
     /// The prior of each unknown.
     pub fn priors(&self) -> &[Distribution] {
         &self.priors
+    }
+
+    /// The coordinate in which each unknown is searched.
+    pub(in crate::gap) fn coordinates(&self) -> &[Coordinate] {
+        &self.coordinates
     }
 
     /// The lower and the upper bound of each unknown.

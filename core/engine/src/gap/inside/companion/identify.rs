@@ -13,7 +13,7 @@ use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, gram, multiply_vector};
 
 use super::gate::{Split, scale};
-use crate::gap::system::coordinate::{curvature, inner, log_slope, moved, room, slope, unit};
+use crate::gap::system::coordinate::{Coordinate, inner, log_slope};
 use crate::gap::system::step::within;
 use crate::stage::direct::ModelMap;
 use crate::study::gap::companion::Companion;
@@ -40,6 +40,7 @@ struct Identification<'a, 'b> {
     runs: &'b [usize],
     own: usize,
     priors: Vec<Distribution>,
+    coordinates: Vec<Coordinate>,
     bounds: Vec<(f64, f64)>,
     /// The standard deviation of the companion's error, in the response's unit.
     sd: f64,
@@ -63,10 +64,12 @@ pub(super) fn constants(
     let own = companion.own();
     let priors: Vec<Distribution> =
         companion.study.parameters[own..].iter().map(|p| p.prior.clone()).collect();
+    let coordinates = priors.iter().map(Coordinate::of).collect();
     let bounds = priors.iter().map(|prior| inner(prior, prior.support())).collect();
     let sd = companion.keys.gate.get() * scale(ensemble, &split.identify);
+    let runs = &split.identify;
     let identification =
-        Identification { map, ensemble, runs: &split.identify, own, priors, bounds, sd };
+        Identification { map, ensemble, runs, own, priors, coordinates, bounds, sd };
     identification.best(random)
 }
 
@@ -134,14 +137,15 @@ impl Identification<'_, '_> {
     fn step(&self, fit: &mut Fit) -> bool {
         let (slopes, residual) = self.linearised(&fit.constants);
         let x = &fit.constants;
-        let units: Vec<f64> = self.priors.iter().zip(x).map(|(p, &x)| unit(p, x)).collect();
+        let coordinates = || self.coordinates.iter().zip(x);
+        let units: Vec<f64> = coordinates().map(|(own, &x)| own.unit(x)).collect();
         let mut gradient = multiply_vector(&slopes, &residual);
         let mut hessian = gram(&slopes.transposed());
-        for (j, prior) in self.priors.iter().enumerate() {
-            gradient[j] = (gradient[j] + slope(prior, x[j])) * units[j];
-            hessian[(j, j)] += curvature(prior, x[j]);
+        for (j, own) in self.coordinates.iter().enumerate() {
+            gradient[j] = (gradient[j] + own.slope(x[j])) * units[j];
+            hessian[(j, j)] += own.curvature(x[j]);
         }
-        let room = self.priors.iter().zip(x).zip(&self.bounds).map(|((p, &x), b)| room(p, x, *b));
+        let room = coordinates().zip(&self.bounds).map(|((own, &x), b)| own.room(x, *b));
         let (low, high): (Vec<f64>, Vec<f64>) = room.unzip();
         for _ in 0..TRIES {
             let damped = Matrix::from_fn(x.len(), x.len(), |i, j| {
@@ -149,7 +153,7 @@ impl Identification<'_, '_> {
                 if i == j { value * (1.0 + fit.damping) + fit.damping } else { value }
             });
             let Some(shift) = within(&damped, &gradient, &low, &high) else { return false };
-            let next = self.priors.iter().zip(x).zip(&shift).map(|((p, &x), s)| moved(p, x, *s));
+            let next = coordinates().zip(&shift).map(|((own, &x), s)| own.moved(x, *s));
             let next = self.clamped(next.collect());
             let height = self.height(&next);
             if height > fit.height {
