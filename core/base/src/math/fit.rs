@@ -148,9 +148,10 @@ mod tests {
             let begun = std::time::Instant::now();
             let fits = fit(&values, 4000.0);
             assert!(begun.elapsed().as_secs_f64() < 1.0, "{relative}: {:?}", begun.elapsed());
-            assert_eq!(fits.len(), if relative > NARROWEST { 3 } else { 1 }, "{relative}");
-            let laws = fits.iter().map(|fit| &fit.distribution);
-            for law in laws.filter(|_| relative > 1e-14) {
+            // A law whose width is lost to rounding is none that a study could have.
+            let count = if relative > NARROWEST { 3 } else { usize::from(relative > 1e-14) };
+            assert_eq!(fits.len(), count, "{relative}");
+            for law in fits.iter().map(|fit| &fit.distribution) {
                 // The relative width is one over the square root of the shape.
                 let width = law.sd() / law.mean() / relative;
                 assert!((width - 1.0).abs() < 0.01, "{relative}: {law}");

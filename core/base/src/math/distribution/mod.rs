@@ -20,6 +20,12 @@ use serde::Serialize;
 /// Largest shape of a beta distribution: its probabilities need more terms the larger the shape.
 const LARGEST_SHAPE: f64 = 1e9;
 
+/// Relative width below which few numbers of double precision lie in an interval.
+const ROUNDING: f64 = 1e-14;
+
+/// The largest number of a distribution lies between these: variances of values beyond them are not numbers of double precision.
+const SIZES: [f64; 2] = [1e-100, 1e100];
+
 /// A distribution of one number, in the unit of that number.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -122,6 +128,12 @@ impl Distribution {
         match *self {
             Self::Uniform([lo, hi]) if lo >= hi => complain("the lower bound below the upper"),
             Self::Uniform([lo, hi]) if !(hi - lo).is_finite() => complain("a narrower interval"),
+            Self::Uniform([lo, hi]) if hi - lo <= ROUNDING * lo.abs().max(hi.abs()) => {
+                complain("an interval that is wider than rounding, 1e-14 of its bounds")
+            }
+            Self::Normal([mean, sd]) if sd > 0.0 && sd <= ROUNDING * mean.abs() => {
+                complain("a standard deviation above rounding, 1e-14 of the mean")
+            }
             Self::Normal([_, sd]) if sd <= 0.0 => complain("a standard deviation above zero"),
             Self::HalfNormal(scale) if scale <= 0.0 => complain("a scale above zero"),
             Self::LogNormal([_, sigma]) if sigma <= 0.0 => complain("a sigma above zero"),
@@ -160,8 +172,26 @@ impl Distribution {
             Self::Triangular([lo, mode, hi]) if !(lo <= mode && mode <= hi && lo < hi) => {
                 complain("the mode between a lower and a higher bound")
             }
+            Self::LogNormal([mu, sigma]) if mu.abs().max(sigma) > SIZES[1].ln() => {
+                complain("a mu and a sigma between -230 and 230")
+            }
+            _ if !self.is_of_ordinary_size() => {
+                complain("numbers of a size between 1e-100 and 1e100, in another unit if need be")
+            }
             _ => Ok(()),
         }
+    }
+
+    /// Squares of the variable, and their reciprocals, are numbers.
+    fn is_of_ordinary_size(&self) -> bool {
+        if let Self::LogUniform([lo, hi]) = *self {
+            // It may span all decades: what matters is where the data leave it.
+            return lo <= SIZES[1] && hi >= SIZES[0];
+        }
+        // Bounds that cut nothing off may be any numbers.
+        let numbers = if let Self::TruncatedNormal(n) = self { &n[..2] } else { self.numbers() };
+        let largest = numbers.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
+        (SIZES[0]..=SIZES[1]).contains(&largest)
     }
 }
 

@@ -346,6 +346,12 @@ fn complaints_say_what_was_expected_and_what_was_found() {
         ("quantiles = [0, nan, 2, 0.1, 0.2, 0.3]", "expected increasing quantiles inside"),
         ("beta = [1e300, 1e-300]", "expected a and b of at most 1e9, found [1e300, 1e-300, 0, 1]"),
         ("beta = [2, 1.5e9]", "expected a and b of at most 1e9, found [2, 1.5e9, 0, 1]"),
+        ("normal = [0, 1e155]", "expected numbers of a size between 1e-100 and 1e100"),
+        ("uniform = [0.5, 0.500000000000001]", "an interval that is wider than rounding"),
+        ("normal = [1.7e9, 1e-6]", "a standard deviation above rounding, 1e-14 of the mean"),
+        ("half_normal = 1e-296", "in another unit if need be, found 1e-296"),
+        ("truncated_normal = [0, 1e-200, 0, inf]", "found [0, 1e-200, 0, inf]"),
+        ("log_normal = [1000, 1]", "expected a mu and a sigma between -230 and 230"),
         ("unifrom = [0, 1]", "found `unifrom` (did you mean `uniform`?)"),
         (
             "normal = [0, 1]\ngamma = [1, 1]",
@@ -356,6 +362,19 @@ fn complaints_say_what_was_expected_and_what_was_found() {
     ] {
         let error = toml::from_str::<Distribution>(text).unwrap_err().to_string();
         assert!(error.contains(message), "{text}: {error}");
+    }
+}
+
+#[test]
+fn small_bounds_beside_an_ordinary_scale_are_allowed() {
+    for text in [
+        "uniform = [1e-300, 1]",
+        "log_uniform = [1e-300, 1e300]",
+        "truncated_normal = [0, 1, 0, 1e300]",
+        "inverse_gamma = [1e-3, 1e-3]",
+        "normal = [1.7e9, 1e-3]",
+    ] {
+        read(text);
     }
 }
 
