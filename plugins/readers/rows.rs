@@ -1,6 +1,6 @@
 //! The rows of a CSV file, one after the other: a long table is never in memory as text.
 
-use std::collections::VecDeque;
+use std::collections::{HashSet, VecDeque};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -33,6 +33,7 @@ impl<R: Read> Rows<R> {
         }
         let heading_line = names.position().map_or(1, |p| p.line() as usize);
         let mut headings: Vec<Heading> = Vec::with_capacity(names.len());
+        let mut texts = HashSet::new();
         let mut faults = Faults::default();
         for (column, text) in names.iter().enumerate() {
             let wrong = |message: String| {
@@ -40,7 +41,7 @@ impl<R: Read> Rows<R> {
                     .at(format!("line {heading_line}, column {}", column + 1))
             };
             let heading = heading(text).map_err(&wrong)?;
-            if headings.iter().any(|h| h.text == heading.text) {
+            if !texts.insert(heading.text.clone()) {
                 let text = format!("two columns are called `{}`", heading.name);
                 faults.note(heading_line, wrong(text));
             }

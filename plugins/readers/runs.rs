@@ -140,20 +140,21 @@ fn failure(sheet: &Sheet, record: &Record) -> Result<Option<String>, ReadError> 
     Ok(Some(if reason.is_empty() { "failed".to_owned() } else { reason.to_owned() }))
 }
 
-/// Assembles the responses of the runs. Runs that the table marks as failed, and runs whose response cannot be read,
+/// Assembles the responses of the runs; `response` gets the index of a run and the run. Runs that the table marks as failed, and runs whose response cannot be read,
 /// are listed and left out; fails if there are more than allowed.
 pub fn ensemble(
     source: &EnsembleSource<'_>,
     table: &Path,
     runs: &[Run],
     allow_failed: AllowFailed,
-    response: impl Fn(&Run) -> Result<Vec<f64>, ReadError> + Sync,
+    response: impl Fn(usize, &Run) -> Result<Vec<f64>, ReadError> + Sync,
 ) -> Result<Ensemble, ReadError> {
     let outcomes: Vec<Result<Vec<f64>, String>> = runs
         .par_iter()
-        .map(|run| match &run.failure {
+        .enumerate()
+        .map(|(i, run)| match &run.failure {
             Some(reason) => Err(reason.clone()),
-            None => response(run).map_err(|error| error.to_string()),
+            None => response(i, run).map_err(|error| error.to_string()),
         })
         .collect();
     let mut failed = Vec::new();

@@ -126,6 +126,8 @@ fn runs_made_by_hand_are_taken_in() {
     fs::write(&table, "run,a,file\nby-hand-1,0.25,first.csv\nby-hand-2,0.75,second.csv\n").unwrap();
     let said = printed(&mut import(&out));
     assert!(said.starts_with("2 runs imported into"), "{said}");
+    let status = printed(&mut campaign(&["status"], &out));
+    assert!(status.contains("2-simulate: 8 runs, 8 done"), "{status}");
     let (code, said) = quick::said(&mut import(&out));
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("there is a run `by-hand-1` already"), "{said}");

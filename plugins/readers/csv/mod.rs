@@ -148,7 +148,7 @@ impl Reader for Csv {
         let table = runs::table_path(source, self.parameters.as_deref(), "parameters")?;
         let list = runs::read_runs(&table, source.parameters)?;
         let Some(responses) = &self.responses else {
-            return runs::ensemble(source, &table, &list, self.allow_failed, |run| {
+            return runs::ensemble(source, &table, &list, self.allow_failed, |_, run| {
                 let file = run.file.as_ref().ok_or_else(|| {
                     ReadError::new(&table, format!("run `{}` has no file", run.name))
                         .help("name the table of responses with `responses`, or each run's file in a column `file`")
@@ -160,9 +160,8 @@ impl Reader for Csv {
         let opened = scenario::sheet(directory, responses, source.scenario, &self.ignore, named)?;
         let path = opened.0.path.clone();
         let values = ensemble::responses(opened, &list, source.layout)?;
-        runs::ensemble(source, &table, &list, self.allow_failed, |run| {
-            let values =
-                list.iter().position(|r| r.name == run.name).and_then(|i| values[i].as_ref());
+        runs::ensemble(source, &table, &list, self.allow_failed, |i, _| {
+            let values = values[i].as_ref();
             let values = values.ok_or_else(|| ReadError::new(&path, "has no row for this run"))?;
             complete(&path, source.layout, values)
         })

@@ -116,9 +116,8 @@ impl NetCdf {
                 return Err(ReadError::new(path, text));
             }
         }
-        let position = |run: &Run| runs.iter().position(|r| r.name == run.name).unwrap_or(0);
-        runs::ensemble(source, path, &runs, self.allow_failed, |run| {
-            let values = values[position(run)].clone();
+        runs::ensemble(source, path, &runs, self.allow_failed, |i, _| {
+            let values = values[i].clone();
             runs::finite(path, source.layout, &values).map(|()| values)
         })
     }
@@ -148,7 +147,7 @@ impl Reader for NetCdf {
         }
         let table = runs::table_path(source, self.runs.as_deref(), "runs")?;
         let list = runs::read_runs(&table, source.parameters)?;
-        runs::ensemble(source, &table, &list, self.allow_failed, |run| {
+        runs::ensemble(source, &table, &list, self.allow_failed, |_, run| {
             let file = run.file.as_ref().ok_or_else(|| {
                 ReadError::new(&table, format!("run `{}` has no file", run.name))
                     .help("name it in a column `file`")

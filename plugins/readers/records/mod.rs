@@ -154,7 +154,7 @@ impl Records {
     pub fn ensemble(&self, open: Open, source: &EnsembleSource<'_>) -> Result<Ensemble, ReadError> {
         let table = runs::table_path(source, self.runs.as_deref(), "runs")?;
         let list = runs::read_runs(&table, source.parameters)?;
-        runs::ensemble(source, &table, &list, self.allow_failed, |run| {
+        runs::ensemble(source, &table, &list, self.allow_failed, |_, run| {
             let file = run.file.as_ref().ok_or_else(|| {
                 ReadError::new(&table, format!("run `{}` has no file", run.name))
                     .help("name it in a column `file`")

@@ -214,7 +214,7 @@ impl Reader for Sierra {
         let list = runs::read_runs(&table, source.parameters)?;
         // The simulate stage names its files in its own table; the pattern applies to the user's table.
         let named = source.simulated.is_none() || self.runs.is_some();
-        runs::ensemble(source, &table, &list, self.allow_failed, |run| {
+        runs::ensemble(source, &table, &list, self.allow_failed, |_, run| {
             let file = match &run.file {
                 Some(file) if !named => file.clone(),
                 _ => self.run_file(&table, run)?,

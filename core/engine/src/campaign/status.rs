@@ -1,6 +1,6 @@
 //! Status of each run.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -81,7 +81,7 @@ pub fn status(study: Option<&Study>, root: &Path, busy: bool) -> Result<Status, 
         with_executor(roll, study, |executor| executor.look(folder))
             .unwrap_or_else(|| Ok(Vec::new()))
     };
-    let names = || study.map_or(Ok(Vec::new()), |study| design::run_names(study.trained()));
+    let names = || study.map_or(Ok((Vec::new(), 0)), |study| design::run_names(study.trained()));
     gathered(root, &look, &names, busy)
 }
 
@@ -100,24 +100,26 @@ fn with_executor<T>(
 /// Like [`status`], from the files of the run directory alone: no scheduler is asked, and runs that were added to the design
 /// appear when they are requested.
 pub fn status_on_disk(root: &Path, busy: bool) -> Result<Status, Stop> {
-    gathered(root, &|_, _| Ok(Vec::new()), &|| Ok(Vec::new()), busy)
+    gathered(root, &|_, _| Ok(Vec::new()), &|| Ok((Vec::new(), 0)), busy)
 }
 
 /// Finds the jobs of the runs in a folder that run or are queued elsewhere.
 type Look<'a> = dyn Fn(&Roll, &Path) -> Result<Vec<Seen>, Stop> + 'a;
 
-/// Status of a run directory; `names` returns the names of all runs of the design.
+/// Status of a run directory; `names` returns the names of all runs of the design, and where the imported ones begin.
 fn gathered(
     root: &Path,
     look: &Look<'_>,
-    names: &dyn Fn() -> Result<Vec<String>, Stop>,
+    names: &dyn Fn() -> Result<(Vec<String>, usize), Stop>,
     busy: bool,
 ) -> Result<Status, Stop> {
     let mut status = Status { runs: Vec::new(), warnings: Vec::new() };
     for (stage, folder, roll) in stages(root)? {
         let of_design = stage == Stage::Simulate.folder().name();
-        let mut added = if of_design { names()? } else { Vec::new() };
-        added.retain(|name| !roll.runs.contains(name));
+        let (all, made) = if of_design { names()? } else { (Vec::new(), 0) };
+        let listed: HashSet<&String> = roll.runs.iter().collect();
+        let added: Vec<(usize, &String)> =
+            all.iter().enumerate().filter(|(_, name)| !listed.contains(name)).collect();
         for (scenario, own) in &roll.scenarios {
             let folder = if own.as_os_str().is_empty() { folder.clone() } else { folder.join(own) };
             let seen = look(&roll, &folder).unwrap_or_else(|stop| {
@@ -135,13 +137,21 @@ fn gathered(
                 let (stage, scenario, run) = (stage.clone(), scenario.clone(), run.clone());
                 status.runs.push(Row { stage, scenario, run, state, note, seconds });
             }
-            status.runs.extend(added.iter().map(|run| Row {
-                stage: stage.clone(),
-                scenario: scenario.clone(),
-                run: run.clone(),
-                state: State::Missing,
-                note: "added to the design, not begun".to_owned(),
-                seconds: None,
+            status.runs.extend(added.iter().map(|&(i, run)| {
+                let (state, note) = if i < made {
+                    (State::Missing, "added to the design, not begun")
+                } else {
+                    (State::Done, "imported")
+                };
+                let (stage, scenario) = (stage.clone(), scenario.clone());
+                Row {
+                    stage,
+                    scenario,
+                    run: run.clone(),
+                    state,
+                    note: note.to_owned(),
+                    seconds: None,
+                }
             }));
         }
     }

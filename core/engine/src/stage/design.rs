@@ -1,5 +1,6 @@
 //! Stage 1: choice of the points at which the simulator is run.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use lacuna::data::Parameter;
@@ -102,7 +103,8 @@ pub fn accept(study: &Study, runs: &[String], further: &Matrix) -> Result<(), St
     let Some(section) = &study.design else { return Ok(()) };
     let imported = imports::read(study)?;
     let mut names = names(&section.common, &imported)?;
-    if let Some(twice) = runs.iter().find(|run| names.contains(run)) {
+    let known: HashSet<&String> = names.iter().collect();
+    if let Some(twice) = runs.iter().find(|run| known.contains(run)) {
         return Err(Stop::new(format!("there is a run `{twice}` already"))
             .help("give it another name in the column `run` of the table"));
     }
@@ -126,10 +128,10 @@ pub fn cube(section: &Section<dyn Plugin, DesignKeys>, study: &Study) -> Result<
     Ok(cube)
 }
 
-/// Names of all runs that the study's design asks for; empty without one.
-pub fn run_names(study: &Study) -> Result<Vec<String>, Stop> {
-    let Some(section) = &study.design else { return Ok(Vec::new()) };
-    names(&section.common, &imports::read(study)?)
+/// Names of all runs of the study's design, and where those begin that are imported; empty without a design.
+pub fn run_names(study: &Study) -> Result<(Vec<String>, usize), Stop> {
+    let Some(section) = &study.design else { return Ok((Vec::new(), 0)) };
+    Ok((names(&section.common, &imports::read(study)?)?, section.common.total()))
 }
 
 /// Names of all runs; those of the initial runs do not change when others are added.
@@ -137,8 +139,9 @@ fn names(keys: &DesignKeys, imported: &[Imported]) -> Result<Vec<String>, Stop> 
     let mut names = super::simulate::names(keys.runs.get());
     let digits = names.last().map_or(0, |last| last.len() - "run".len());
     names.extend((names.len() + 1..=keys.total()).map(|i| format!("run{i:0digits$}")));
+    let mut known: HashSet<String> = names.iter().cloned().collect();
     for imported in imported {
-        if let Some(twice) = imported.names.iter().find(|name| names.contains(name)) {
+        if let Some(twice) = imported.names.iter().find(|name| !known.insert((*name).clone())) {
             return Err(Stop::new(format!(
                 "the run `{twice}` in {} has the name of another run",
                 imported.folder.display()

@@ -5,6 +5,7 @@
 //! depends on the parameters, so it is predicted from them as far as held-out runs confirm; the remainder is treated as
 //! noise with mean zero.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use lacuna::data::{Ensemble, Parameter};
@@ -298,9 +299,13 @@ struct Pairs {
 
 impl Pairs {
     fn of(finer: &Ensemble, ordinary: &Ensemble) -> Result<Self, Stop> {
-        let row = |name: &String| ordinary.runs.iter().position(|run| run == name);
-        let (rows, others): (Vec<usize>, Vec<usize>) =
-            finer.runs.iter().enumerate().filter_map(|(i, name)| Some((i, row(name)?))).unzip();
+        let row: HashMap<&String, usize> = ordinary.runs.iter().zip(0..).collect();
+        let (rows, others): (Vec<usize>, Vec<usize>) = finer
+            .runs
+            .iter()
+            .enumerate()
+            .filter_map(|(i, name)| Some((i, *row.get(name)?)))
+            .unzip();
         if rows.is_empty() {
             return Err(Stop::new("none of the repeated runs has a usable response"));
         }

@@ -1,5 +1,6 @@
 //! Runs of all scenarios combined into one ensemble.
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
 
@@ -126,9 +127,10 @@ fn joined(study: &Study, mut parts: Vec<(Ensemble, Range<usize>)>) -> Result<Ens
     let (mut runs, mut valid) = (Vec::new(), Vec::new());
     let mut points = Matrix::zeros(0, first.parameters.len());
     let mut responses = Matrix::zeros(0, study.layouts.len());
+    let rows_of: Vec<HashMap<&String, usize>> =
+        parts.iter().map(|(part, _)| part.runs.iter().zip(0..).collect()).collect();
     for (i, name) in first.runs.iter().enumerate() {
-        let rows: Option<Vec<usize>> =
-            parts.iter().map(|(part, _)| part.runs.iter().position(|run| run == name)).collect();
+        let rows: Option<Vec<usize>> = rows_of.iter().map(|rows| rows.get(name).copied()).collect();
         let Some(rows) = rows else { continue };
         let mut response = vec![0.0; study.layouts.len()];
         for ((part, outputs), &row) in parts.iter().zip(&rows) {
