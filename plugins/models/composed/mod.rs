@@ -1,12 +1,13 @@
 //! `composed`: models in a chain, in which the output of one is an input of those after it.
 
+mod handed;
 mod part;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use lacuna::data::{Condition, Coordinates, Function, Interpolation, Layout, Scenario, Unit};
+use lacuna::data::{Condition, Layout, Scenario, Unit};
 use lacuna::plugin::model::{Call, EvalError, Input, Response, Signature};
 use lacuna::plugin::{Component, Context, Fact, Given, Library, Model};
 use lacuna::run::Fault;
@@ -15,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{given, nested};
+use handed::{Handed, announce, handed};
 use part::{Part, pass_on};
 
 /// Models in a chain, in which the output of each is an input of those after it, as from load to response to sensor.
@@ -38,78 +40,23 @@ pub struct Composed {
     pub parts: Vec<Part>,
 }
 
-/// One quantity that a part passes on.
-struct Handed {
-    name: String,
-    unit: Unit,
-    /// Numeric axis and its unit, if the quantity is a function.
-    grid: Option<(Vec<f64>, Unit)>,
-    /// Index of its first value in the response of the part.
-    begin: usize,
-}
-
-/// Converts an output of this shape to the quantities that the parts after it receive; fails if the shape is not
-/// supported.
-fn handed(layout: &Layout) -> Result<Vec<Handed>, String> {
-    let labels = |i: usize| match layout.axes.get(i).map(|axis| &axis.coordinates) {
-        Some(Coordinates::Labels(labels)) => Some(labels.clone()),
-        _ => None,
-    };
-    let grid = |i: usize| match layout.axes.get(i).map(|axis| &axis.coordinates) {
-        Some(Coordinates::Grid { values, unit }) => Some((values.clone(), unit.clone())),
-        _ => None,
-    };
-    let one = |name: String, grid: Option<(Vec<f64>, Unit)>, i: usize| {
-        let length = grid.as_ref().map_or(1, |(values, _)| values.len());
-        Handed { name, unit: layout.unit.clone(), grid, begin: i * length }
-    };
-    let name = layout.name.clone();
-    match (layout.axes.len(), labels(0), grid(0), grid(1)) {
-        (0, ..) => Ok(vec![one(name, None, 0)]),
-        (1, _, Some(grid), _) => Ok(vec![one(name, Some(grid), 0)]),
-        (1, Some(labels), ..) => {
-            Ok(labels.into_iter().enumerate().map(|(i, label)| one(label, None, i)).collect())
-        }
-        (2, Some(labels), _, Some(grid)) => Ok(labels
-            .into_iter()
-            .enumerate()
-            .map(|(i, label)| one(label, Some(grid.clone()), i))
-            .collect()),
-        _ => {
-            Err("expected no axes, labels, one axis of numbers, or labels and then numbers".into())
-        }
+/// Layout requested from a part: its own, or the study's from the last.
+fn asked(part: &Part, name: &str, last: bool, study: &Layout) -> Result<Layout, String> {
+    match (part.gives()?, last) {
+        (Some(layout), false) => Ok(layout),
+        (None, true) => Ok(study.clone()),
+        (None, false) => Err(format!("part `{name}` needs the option `gives`, its response")),
+        (Some(_), true) => Err(format!(
+            "part `{name}` is the last and gives the study's response: leave out `gives`"
+        )),
     }
 }
 
-impl Handed {
-    /// Returns the function with these values; `None` if the quantity is a number.
-    fn function(&self, values: &[f64]) -> Option<Function> {
-        let (at, at_unit) = self.grid.as_ref()?;
-        Some(Function {
-            name: self.name.clone(),
-            at: at.clone(),
-            at_unit: at_unit.clone(),
-            values: values.to_vec(),
-            unit: self.unit.clone(),
-            interpolation: Interpolation::Linear,
-        })
-    }
-}
-
-/// Announces the quantities to the parts after: numbers by name, functions by name and points.
-fn announce(handed: &[Handed], given: &mut Vec<Given>, scenarios: &mut [Scenario]) {
-    for output in handed {
-        let zeros = output.grid.as_ref().map_or_else(Vec::new, |(at, _)| vec![0.0; at.len()]);
-        if let Some(function) = output.function(&zeros).map(Arc::new) {
-            for scenario in &mut *scenarios {
-                scenario.functions.retain(|known| known.name != output.name);
-                scenario.functions.push(Arc::clone(&function));
-            }
-        } else {
-            given.retain(|other| other.name != output.name);
-            given.push(Given { name: output.name.clone(), unit: Some(output.unit.clone()) });
-        }
-    }
+/// A part that does not fit in its chain.
+struct Misfit {
+    /// Index of the part.
+    part: usize,
+    reason: String,
 }
 
 /// A part with everything needed to evaluate it.
@@ -126,27 +73,18 @@ struct Link<'a> {
 impl Composed {
     /// Links the leading parts whose options are valid, in the context of the study; the error describes what does
     /// not fit.
-    fn links<'a>(&'a self, context: &Context<'_>) -> Result<Vec<Link<'a>>, String> {
+    fn links<'a>(&'a self, context: &Context<'_>) -> Result<Vec<Link<'a>>, Misfit> {
         let mut given = context.given.to_vec();
         let mut scenarios = context.scenarios.to_vec();
         let mut links = Vec::new();
         for (i, part) in self.parts.iter().enumerate() {
             let Ok(section) = part.section() else { break };
+            let misfit = |reason| Misfit { part: i, reason };
             let name = section.common.name.as_str().to_owned();
             let last = i + 1 == self.parts.len();
-            let asked = match (part.gives()?, last) {
-                (Some(layout), false) => layout,
-                (None, true) => context.layout.clone(),
-                (None, false) => {
-                    return Err(format!("part `{name}` needs the option `gives`, its response"));
-                }
-                (Some(_), true) => {
-                    return Err(format!(
-                        "part `{name}` is the last and gives the study's response: leave out `gives`"
-                    ));
-                }
-            };
-            let seen = part.seen(&given).map_err(|what| format!("part `{name}`: {what}"))?;
+            let asked = asked(part, &name, last, context.layout).map_err(misfit)?;
+            let seen =
+                part.seen(&given).map_err(|what| misfit(format!("part `{name}`: {what}")))?;
             let own = Context {
                 given: &seen,
                 scenarios: &scenarios,
@@ -155,7 +93,7 @@ impl Composed {
             };
             let model = &*section.built.plugin;
             let signature = model.signature(&own);
-            let handed = if last { Vec::new() } else { handed(&asked)? };
+            let handed = if last { Vec::new() } else { handed(&asked).map_err(misfit)? };
             announce(&handed, &mut given, &mut scenarios);
             links.push(Link { model, name, asked, signature, handed });
         }
@@ -260,8 +198,8 @@ impl Component for Composed {
         self.parts.iter().enumerate().for_each(|(i, part)| part.check(i, complaints));
         let links = match self.links(context) {
             Ok(links) => links,
-            Err(reason) => {
-                complaints.at("parts").say(reason);
+            Err(Misfit { part, reason }) => {
+                complaints.at(&format!("parts.{part}")).say(reason);
                 return;
             }
         };
@@ -354,7 +292,7 @@ impl Model for Composed {
             scenarios: &scenarios,
             ..Context::new(call.study, &[], call.layout)
         };
-        let links = self.links(&context).map_err(EvalError::Fatal)?;
+        let links = self.links(&context).map_err(|misfit| EvalError::Fatal(misfit.reason))?;
         if links.len() < self.parts.len() {
             return Err(EvalError::Fatal("the options of a part are wrong".to_owned()));
         }

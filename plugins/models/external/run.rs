@@ -59,7 +59,7 @@ impl External {
         fs::create_dir_all(folder).map_err(|error| cannot("make the folder", folder, &error))?;
         self.provide(call, folder)?;
         let status = self.execute(call, folder)?;
-        self.judge(status, folder)?;
+        self.judge(status, call, folder)?;
         self.response(call, folder)
     }
 
@@ -138,8 +138,8 @@ impl External {
     }
 
     /// Fails unless the run satisfies the conditions for success.
-    fn judge(&self, status: ExitStatus, folder: &Path) -> Result<(), EvalError> {
-        let name = self.name();
+    fn judge(&self, status: ExitStatus, call: &Call<'_>, folder: &Path) -> Result<(), EvalError> {
+        let name = self.name(call);
         match status.code() {
             None => return Err(rejected(folder, format!("`{name}` {}", signalled(status)))),
             Some(code) if !self.success.exit_codes.contains(&code) => {
@@ -181,15 +181,15 @@ impl External {
                 if error.path.exists() {
                     return EvalError::Rejected(inside(folder, &error.to_string()));
                 }
-                let (name, path) = (self.name(), file.path().display());
+                let (name, path) = (self.name(call), file.path().display());
                 rejected(folder, format!("`{name}` wrote no file `{path}`"))
             }),
         }
     }
 
-    /// Returns the program as named in the study.
-    fn name(&self) -> &str {
-        self.command.first().map_or("", Template::as_str)
+    /// Returns the program as named in the study, with the placeholders filled in.
+    fn name(&self, call: &Call<'_>) -> String {
+        self.command.first().and_then(|word| fill(word, call).ok()).unwrap_or_default()
     }
 }
 

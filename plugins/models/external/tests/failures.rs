@@ -45,6 +45,11 @@ fn exit_codes_and_signals_are_told_with_the_end_of_the_errors() {
     let reason =
         "`sh` ended with exit code 3; it said: error 3\nerror 4\nerror 5\nerror 6\nerror 7";
     assert_eq!(Case::shell(script, "").reason(), reason);
+    // A program is named with its place, not with the text of the study.
+    let own = Case::new("command = [\"{{ study }}/solver\"]\noutput = \"json\"");
+    let solver = own.study.path().join("solver");
+    std::os::unix::fs::symlink("/bin/false", &solver).unwrap();
+    assert_eq!(own.reason(), format!("`{}` ended with exit code 1", solver.display()));
     let quiet = Case::shell("echo what is wrong; exit 1", "");
     assert_eq!(quiet.reason(), "`sh` ended with exit code 1; it said: what is wrong");
     assert_eq!(Case::shell("kill -s SEGV $$", "").reason(), "`sh` was ended by signal 11");
