@@ -16,8 +16,8 @@ use crate::protocol::{
 pub use answer::read as read_answer;
 pub use error::Error;
 
-/// Largest response that is read, in bytes.
-const LARGEST: u64 = 1 << 30;
+/// Largest response that is read, in bytes: ten million numbers with all their digits. In memory it takes up to eight times that.
+const LARGEST: u64 = 1 << 28;
 
 /// Longest wait for a connection.
 const CONNECTING: Duration = Duration::from_secs(10);
@@ -52,6 +52,8 @@ impl Client {
             .http_status_as_error(false)
             // A model's server is on this machine or nearby; the proxy settings of the environment are for the web.
             .proxy(None)
+            // A question is sent once more to another address only by who wrote the address.
+            .max_redirects(0)
             .timeout_global(Some(timeout))
             .timeout_connect(Some(timeout.min(CONNECTING)))
             .max_idle_connections_per_host(64)
@@ -194,6 +196,12 @@ impl Client {
     ) -> Result<T, Error> {
         let mut response = response.map_err(|error| self.failed(error))?;
         let status = response.status().as_u16();
+        if response.status().is_redirection()
+            && let Some(place) = response.headers().get("location")
+        {
+            let to = String::from_utf8_lossy(place.as_bytes()).into_owned();
+            return Err(Error::Moved { url: self.url.clone(), to });
+        }
         let body = response.body_mut().with_config().limit(LARGEST).read_to_vec();
         let body = body.map_err(|error| match self.failed(error) {
             Error::Broken { url, .. } => {

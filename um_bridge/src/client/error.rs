@@ -42,6 +42,14 @@ pub enum Error {
         /// First line of the response, after a colon.
         text: String,
     },
+    /// The server refers to another address.
+    #[error("the server at {url} refers to `{to}`: write the address of the server itself")]
+    Moved {
+        /// Address of the server.
+        url: String,
+        /// Address that it names.
+        to: String,
+    },
     /// The server reported an error.
     #[error("the server at {url} reports {fault}")]
     Fault {
@@ -66,7 +74,7 @@ impl Error {
     /// Any other failure may be due to the input: a model that crashes, hangs or diverges.
     pub fn is_final(&self) -> bool {
         match self {
-            Self::Unreachable { .. } | Self::Foreign { .. } => true,
+            Self::Unreachable { .. } | Self::Foreign { .. } | Self::Moved { .. } => true,
             Self::Fault { fault, .. } => {
                 [MODEL_NOT_FOUND, UNSUPPORTED_FEATURE].contains(&fault.kind.as_str())
             }

@@ -119,6 +119,14 @@ fn answers_that_are_none_have_their_reasons() {
             true,
         ),
         (
+            "HTTP/1.1 302 Found\r\nLocation: http://elsewhere/Evaluate\r\nContent-Length: 0\r\n\r\n"
+                .to_owned(),
+            "the server at URL refers to `http://elsewhere/Evaluate`: write the address of the \
+             server itself"
+                .to_owned(),
+            true,
+        ),
+        (
             whole[..whole.len() - 3].to_owned(),
             "the server at URL broke the connection: the answer breaks off before its end"
                 .to_owned(),
