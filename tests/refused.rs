@@ -85,6 +85,11 @@ fn impossible_sizes_are_refused_where_they_stand() {
         ("validate.emulator_check=1000000000000", "validate.emulator_check", "the runs need"),
         ("surrogate.validation=9223372036854775807", "surrogate", "more runs"),
         ("surrogate.refine.runs=1000000000000", "surrogate.refine.runs", "the runs of all rounds"),
+        (
+            "surrogate.refine={runs=5,rounds=1000000000000}",
+            "surrogate.refine.rounds",
+            "of all rounds",
+        ),
         ("sampler.stop.effective_sample_size=10", "", ""),
     ] {
         let text = complaints(&[setting]);
@@ -106,20 +111,24 @@ fn impossible_sizes_are_refused_where_they_stand() {
 
 #[test]
 fn fixed_values_are_finite() {
-    let checked = |z: &str| {
+    let checked = |z: &str, companion: &str| {
         let text = format!(
             "[study]\ntitle = \"x\"\n[[parameter]]\nname = \"a\"\nprior = {{ uniform = [0, 4] }}\n\
              [response]\nname = \"y\"\n[model]\nuse = \"equations\"\nobserve = \"a + z\"\n\
              fixed = {{ z = {z} }}\n[design]\nuse = \"random\"\nruns = 30\n[surrogate]\n\
-             use = \"polynomial_chaos\"\ndegree = 2\n"
+             use = \"polynomial_chaos\"\ndegree = 2\n{companion}"
         );
         load_text(Path::new("study.toml"), &text, &[]).complaints()
     };
-    assert_eq!(checked("1.5"), "");
+    assert_eq!(checked("1.5", ""), "");
     for z in ["-inf", "nan"] {
-        let text = checked(z);
+        let text = checked(z, "");
         assert!(text.contains("`z` is not finite"), "{text}");
     }
+    let companion =
+        "[gap.companion]\nuse = \"equations\"\nobserve = \"a + w\"\nfixed = { w = inf }\n";
+    let text = checked("1.5", companion);
+    assert!(text.contains("`w` is not finite"), "{text}");
 }
 
 /// Sizes that only the plugin knows to need memory.

@@ -32,8 +32,12 @@ pub fn write(folder: &Path) -> anyhow::Result<()> {
         ("responses.csv", RESPONSES),
         ("measured.csv", MEASURED),
     ];
-    for (file, text) in all {
-        files::write_atomic(&folder.join(file), text.as_bytes())?;
+    let write =
+        |(file, text): (&str, &str)| files::write_atomic(&folder.join(file), text.as_bytes());
+    if let Err(stop) = all.into_iter().try_for_each(write) {
+        // A part of a skeleton would be in the way of the next attempt.
+        let _ = std::fs::remove_dir_all(folder);
+        return Err(stop.into());
     }
     print(&format!("wrote {0}; run it with `lacuna run {0}/study.toml`", folder.display()));
     Ok(())

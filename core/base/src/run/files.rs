@@ -145,9 +145,9 @@ pub fn cannot_write(path: &Path, error: &io::Error) -> Stop {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
             stop.help("free some space and run the same command again: finished work is kept")
         }
-        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
-            stop.help("choose a folder that you may write to with `--out DIR`")
-        }
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => stop.help(
+            "choose a folder that you may write to, where the command takes one with `--out DIR`",
+        ),
         _ => stop,
     }
 }

@@ -179,14 +179,14 @@ fn needs(study: &Study) -> Vec<Need> {
         }
     }
     if let Some(refine) = study.surrogate.as_ref().and_then(|s| s.common.refine.as_ref()) {
-        let rounds = refine.rounds.get() as f64;
-        add(
-            "surrogate.refine.runs",
-            "the runs of all rounds",
-            refine.runs.get(),
-            rounds * run,
-            rounds * kept,
-        );
+        let (runs, rounds) = (refine.runs.get(), refine.rounds.get());
+        // The larger of the two is the one to lower.
+        let (key, size, times) = if runs >= rounds {
+            ("surrogate.refine.runs", runs, rounds as f64)
+        } else {
+            ("surrogate.refine.rounds", rounds, runs as f64)
+        };
+        add(key, "the runs of all rounds", size, times * run, times * kept);
     }
     if let Some(error) = &study.numerical_error {
         add("numerical_error.runs", "the finer runs", error.runs, run, kept);

@@ -171,7 +171,14 @@ fn inputs(
             .help(format!("add it to `fixed = {{ {} = … }}`", input.name))
             .help("or to `[[gap.companion.parameter]]`, to identify it from the runs");
     }
-    for name in companion.keys.fixed.keys() {
+    for (name, quantity) in &companion.keys.fixed {
+        if !quantity.value.is_finite() {
+            complaints
+                .at(&format!("fixed.{name}"))
+                .say(format!("`{name}` is not finite"))
+                .expected("a finite number")
+                .found(quantity.value);
+        }
         if !signature.inputs.iter().any(|input| &input.name == name) {
             complaints
                 .at(&format!("fixed.{name}"))
