@@ -4,8 +4,10 @@
 //! `LACUNA_REQUIRE_PYTHON=1` makes that a failure.
 
 use std::ffi::OsString;
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::Command;
+use std::process::{ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 
 use crate::{left_out, quick};
 
@@ -20,13 +22,44 @@ pub fn interpreter(packages: &str) -> Option<OsString> {
     python
 }
 
+/// Runs scripts, each in a process of its own that has imported arviz: the import takes longer than most of them.
+const SERVER: &str = r"
+import json, os, sys
+import arviz
+for line in sys.stdin:
+    script, arguments, printed = json.loads(line)
+    child = os.fork()
+    if child == 0:
+        for stream in (1, 2):
+            os.dup2(os.open(printed, os.O_WRONLY | os.O_CREAT | os.O_APPEND), stream)
+        sys.argv[1:] = arguments
+        exec(compile(script, 'script', 'exec'), {'__name__': '__main__'})
+        sys.stdout.flush()
+        os._exit(0)
+    print(os.waitpid(child, 0)[1], flush=True)
+";
+
+/// The process of [`SERVER`], which ends with the tests, with its questions and answers.
+static SERVING: Mutex<Option<(ChildStdin, BufReader<ChildStdout>)>> = Mutex::new(None);
+
 /// Output of a script as JSON; `None` if there is no interpreter and none is required.
 fn python(script: &str, arguments: &[&Path]) -> Option<serde_json::Value> {
     let python = interpreter("arviz and netCDF4")?;
-    let output = Command::new(python).arg("-c").arg(script).args(arguments).output().unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{errors}");
-    let text = String::from_utf8(output.stdout).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let printed = folder.path().join("printed");
+    let mut serving = SERVING.lock().unwrap_or_else(PoisonError::into_inner);
+    let (questions, answers) = serving.get_or_insert_with(|| {
+        let mut command = Command::new(python);
+        command.args(["-c", SERVER]).stdin(Stdio::piped()).stdout(Stdio::piped());
+        #[expect(clippy::zombie_processes, reason = "it ends with the tests")]
+        let mut server = command.spawn().unwrap();
+        (server.stdin.take().unwrap(), BufReader::new(server.stdout.take().unwrap()))
+    });
+    writeln!(questions, "{}", serde_json::json!([script, arguments, printed])).unwrap();
+    let mut status = String::new();
+    answers.read_line(&mut status).unwrap();
+    let text = std::fs::read_to_string(&printed).unwrap_or_default();
+    assert_eq!(status, "0\n", "{text}");
     Some(serde_json::from_str(text.lines().last().unwrap()).unwrap())
 }
 

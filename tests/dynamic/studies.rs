@@ -124,7 +124,7 @@ fn a_run_keeps_what_it_loaded_and_goes_on_with_it() {
     // program, so it is removed and written anew.
     std::fs::remove_file(&library).unwrap();
     std::fs::write(&library, "no library").unwrap();
-    let complaints = load_for(&resolved, &[], Use::Look).complaints();
+    let complaints = load_for(&resolved, &[], Use::Run).complaints();
     assert!(complaints.contains("it is not the pinned file: expected sha256"), "{complaints}");
 }
 
