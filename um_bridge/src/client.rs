@@ -52,7 +52,7 @@ impl Client {
             .http_status_as_error(false)
             // A model's server is on this machine or nearby; the proxy settings of the environment are for the web.
             .proxy(None)
-            // A question is sent once more to another address only by who wrote the address.
+            // A redirect would send the question to an address that the study does not name.
             .max_redirects(0)
             .timeout_global(Some(timeout))
             .timeout_connect(Some(timeout.min(CONNECTING)))
