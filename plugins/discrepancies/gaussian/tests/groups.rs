@@ -289,6 +289,18 @@ fn values_left_out_of_an_integral_have_their_densities() {
     }
 }
 
+/// Independent data of known variance have their own normal densities, however far one lies.
+#[test]
+fn a_value_far_outside_has_a_finite_density() {
+    let mut data = data(2, 3);
+    let response = random_matrix(1, OUTPUTS, 4);
+    let i = (0..OUTPUTS).find(|&i| data.replicates[0].values[i].is_some()).unwrap();
+    data.replicates[0].values[i] = Some(response[(0, i)] + 60.0);
+    let likelihood = build(&data, &[], "variance = { known = 1.0 }");
+    let found = likelihood.left_out(response.row(0), &[]).unwrap();
+    close(found[0], -0.5 * (60.0_f64.powi(2) + std::f64::consts::TAU.ln()), 1e-12);
+}
+
 #[test]
 fn several_variances_are_not_integrated_out_with_common_errors() {
     let text = "variance = { half_normal = 1.0 }\nby = \"sensor\"\nmarginal = true";
