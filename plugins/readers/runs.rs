@@ -140,8 +140,8 @@ fn failure(sheet: &Sheet, record: &Record) -> Result<Option<String>, ReadError> 
     Ok(Some(if reason.is_empty() { "failed".to_owned() } else { reason.to_owned() }))
 }
 
-/// Assembles the responses of the runs; `response` gets the index of a run and the run. Runs that the table marks as failed, and runs whose response cannot be read,
-/// are listed and left out; fails if there are more than allowed.
+/// Assembles the responses of the runs; `response` gets the index of a run and the run. Runs that the table marks as failed,
+/// and runs whose response cannot be read, are listed and left out; fails if there are more than allowed.
 pub fn ensemble(
     source: &EnsembleSource<'_>,
     table: &Path,

@@ -16,7 +16,8 @@ use crate::protocol::{
 pub use answer::read as read_answer;
 pub use error::Error;
 
-/// Largest response that is read, in bytes: ten million numbers with all their digits. In memory it takes up to eight times that.
+/// Largest response that is read, in bytes: ten million numbers with all their digits. In memory it takes up to eight times
+/// that.
 const LARGEST: u64 = 1 << 28;
 
 /// Longest wait for a connection.
